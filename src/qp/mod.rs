@@ -1,0 +1,3 @@
+//! Quadratic programming with bounds and a projector: pure optimisation, no meshes, no FETI.
+
+pub mod quadratic;

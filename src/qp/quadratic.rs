@@ -1,0 +1,35 @@
+//! What a solver needs to know of a quadratic function: products with its Hessian, inner products, a projector.
+//!
+//! Vectors are slices of one rank's entries; several ranks may hold the same entry. Everything a solver branches on
+//! must come out of [`Space`], whose results are the same bits on every rank.
+
+/// Inner products and reductions over a distributed vector.
+pub trait Space {
+    /// `x'y` of each pair, in one collective.
+    fn dots(&self, pairs: &[(&[f64], &[f64])]) -> Vec<f64>;
+
+    /// The smallest of all ranks' values; NaN if any is NaN.
+    fn minimum(&self, mine: f64) -> f64;
+
+    /// `x'y`.
+    fn dot(&self, x: &[f64], y: &[f64]) -> f64 {
+        self.dots(&[(x, y)])[0]
+    }
+
+    /// Euclidean norm.
+    fn norm(&self, x: &[f64]) -> f64 {
+        self.dot(x, x).sqrt()
+    }
+}
+
+/// A symmetric positive semidefinite matrix known by its products.
+pub trait Operator {
+    /// `y = A x`.
+    fn apply(&mut self, x: &[f64], y: &mut [f64]);
+}
+
+/// The orthogonal projector onto the null space of the equality constraints `G x = 0`.
+pub trait Projection {
+    /// `x = P x`, in place.
+    fn project(&mut self, x: &mut [f64]);
+}
