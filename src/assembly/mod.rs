@@ -1,0 +1,21 @@
+//! From elements to the torn vectors and matrices: sparsity (once), stiffness, internal forces, loads.
+//!
+//! Every function works on one subdomain; nothing here communicates.
+
+pub mod internal;
+pub mod loads;
+pub mod pattern;
+pub mod stiffness;
+
+use crate::decomposition::Subdomain;
+use crate::element::tet4::Tet4;
+
+/// Geometry of an element. Cut and mesh were checked before: elements are sound here.
+fn geometry(subdomain: &Subdomain, nodes: &[u32; 4]) -> Tet4 {
+    Tet4::new(&nodes.map(|n| subdomain.points[n as usize])).expect("elements of a checked mesh have volume")
+}
+
+/// Nodal displacements of an element.
+fn displacements(u: &[f64], nodes: &[u32; 4]) -> [f64; 12] {
+    std::array::from_fn(|k| u[3 * nodes[k / 3] as usize + k % 3])
+}

@@ -1,0 +1,128 @@
+//! Sparsity of a subdomain's stiffness matrix: lower triangle by columns, in blocks of 3x3 a pair of nodes.
+//!
+//! Depends on the connectivity only, so congruent subdomains share one.
+
+/// Lower triangle by columns, diagonal first; entries of one node lie together in every column.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Pattern {
+    /// First entry of each column, and the end.
+    pub column_begin: Vec<u32>,
+    /// Row of each entry, ascending within a column.
+    pub rows: Vec<u32>,
+    /// Adjacency of the nodes (without themselves), as METIS wants it: begins and neighbours.
+    pub adjacency: (Vec<i32>, Vec<i32>),
+}
+
+impl Pattern {
+    /// Of elements on `nodes` nodes, with all nodes of `clique` coupled besides.
+    pub fn new(nodes: usize, elements: &[[u32; 4]], clique: &[u32]) -> Self {
+        let mut pairs: Vec<(u32, u32)> = elements
+            .iter()
+            .flat_map(|tet| (0..16).map(|k| (tet[k / 4], tet[k % 4])))
+            .chain(clique.iter().flat_map(|&a| clique.iter().map(move |&b| (a, b))))
+            .filter(|(a, b)| a != b)
+            .collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut begins = vec![0; nodes + 1];
+        for &(a, _) in &pairs {
+            begins[a as usize + 1] += 1;
+        }
+        for a in 0..nodes {
+            begins[a + 1] += begins[a];
+        }
+        let neighbours: Vec<i32> = pairs.iter().map(|&(_, b)| b as i32).collect();
+
+        let mut column_begin = vec![0];
+        let mut rows = Vec::new();
+        for node in 0..nodes {
+            let others = &neighbours[begins[node] as usize..begins[node + 1] as usize];
+            for axis in 0..3 {
+                rows.extend((axis..3).map(|i| 3 * node as u32 + i as u32));
+                for &below in others.iter().filter(|&&b| b as usize > node) {
+                    rows.extend((0..3).map(|i| 3 * below as u32 + i));
+                }
+                column_begin.push(rows.len() as u32);
+            }
+        }
+        Self { column_begin, rows, adjacency: (begins, neighbours) }
+    }
+
+    /// Number of unknowns.
+    pub fn dofs(&self) -> usize {
+        self.column_begin.len() - 1
+    }
+
+    /// Position of the block of nodes `(row, column)`, `row > column`, within each of the column's three columns: entry
+    /// `(3 row + i, 3 column + j)` is at `column_begin[3 column + j] + offset - j + i`.
+    pub fn block_offset(&self, row: u32, column: u32) -> usize {
+        let begin = self.column_begin[3 * column as usize] as usize;
+        let end = self.column_begin[3 * column as usize + 1] as usize;
+        self.rows[begin..end].binary_search(&(3 * row)).expect("the pair of nodes is in the pattern")
+    }
+
+    /// Adds a 3x3 block `[i][j]` of nodes `(row, column)` to the lower triangle's values; of a diagonal block the lower
+    /// part counts.
+    pub fn add_block(&self, values: &mut [f64], row: u32, column: u32, block: &[[f64; 3]; 3]) {
+        for j in 0..3 {
+            let begin = self.column_begin[3 * column as usize + j] as usize;
+            if row == column {
+                (j..3).for_each(|i| values[begin + i - j] += block[i][j]);
+            } else {
+                let at = begin + self.block_offset(row, column) - j;
+                (0..3).for_each(|i| values[at + i] += block[i][j]);
+            }
+        }
+    }
+
+    /// `y += A x` for the symmetric matrix with these lower values.
+    pub fn multiply_add(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
+        for column in 0..self.dofs() {
+            let range = self.column_begin[column] as usize..self.column_begin[column + 1] as usize;
+            let (rows, entries) = (&self.rows[range.clone()], &values[range]);
+            let mut sum = entries[0] * x[column];
+            let xc = x[column];
+            for (&row, &value) in rows[1..].iter().zip(&entries[1..]) {
+                y[row as usize] += value * xc;
+                sum += value * x[row as usize];
+            }
+            y[column] += sum;
+        }
+    }
+
+    /// The diagonal of the matrix with these values.
+    pub fn diagonal(&self, values: &[f64]) -> Vec<f64> {
+        (0..self.dofs()).map(|c| values[self.column_begin[c] as usize]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_land_where_they_belong() {
+        let pattern = Pattern::new(5, &[[0, 1, 2, 3], [1, 2, 3, 4]], &[0, 4]);
+        // All pairs but (0, 4), which the clique adds: full lower triangle.
+        assert_eq!(pattern.rows.len(), 15 * 16 / 2);
+        let mut values = vec![0.0; pattern.rows.len()];
+        let block = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]];
+        pattern.add_block(&mut values, 4, 1, &block);
+        pattern.add_block(&mut values, 2, 2, &[[1.0, 2.0, 3.0], [2.0, 4.0, 5.0], [3.0, 5.0, 6.0]]);
+        for j in 0..15 {
+            let mut unit = vec![0.0; 15];
+            unit[j] = 1.0;
+            let mut y = vec![0.0; 15];
+            pattern.multiply_add(&values, &unit, &mut y);
+            for (i, &value) in y.iter().enumerate() {
+                let expected = match (i / 3, j / 3) {
+                    (4, 1) => block[i % 3][j % 3],
+                    (1, 4) => block[j % 3][i % 3],
+                    (2, 2) => [[1.0, 2.0, 3.0], [2.0, 4.0, 5.0], [3.0, 5.0, 6.0]][i % 3][j % 3],
+                    _ => 0.0,
+                };
+                assert_eq!(value, expected, "({i}, {j})");
+            }
+        }
+    }
+}

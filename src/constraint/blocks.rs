@@ -1,0 +1,154 @@
+//! Setting up the rows of one rank, block by block.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use super::contact::Side;
+use super::{ConstraintError, Constraints, Entry, Row, Support, contact, dirichlet, gluing};
+use crate::comm::{Comm, all_gather_u64};
+use crate::contact::ContactPair;
+use crate::decomposition::{Decomposition, InterfaceNode};
+
+/// Nodes tied together by contact, and the pairs that tie them.
+#[derive(Default)]
+struct Cluster {
+    nodes: BTreeSet<u64>,
+    pairs: Vec<usize>,
+}
+
+impl Constraints {
+    /// All rows that touch this rank's subdomains. `pairs` are the contact pairs of the whole scene. Collective.
+    ///
+    /// # Errors
+    /// If supports contradict each other (on the ranks that see it).
+    pub fn new(
+        comm: &dyn Comm,
+        decomposition: &Decomposition,
+        supports: &[Support],
+        pairs: &[ContactPair],
+    ) -> Result<Self, ConstraintError> {
+        let contact_nodes = gather_nodes(comm, decomposition, pairs);
+        let (cluster_of, clusters) = clusters(pairs);
+        let own: HashMap<u64, &InterfaceNode> = decomposition.interface.iter().map(|n| (n.node, n)).collect();
+        let node = |number: u64| contact_nodes.get(&number).or_else(|| own.get(&number).copied());
+
+        let keys: BTreeSet<u64> =
+            own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
+        let mut result = Self {
+            rows: Vec::new(),
+            blocks: Vec::new(),
+            block_subdomains: Vec::new(),
+            slot_begin: vec![0],
+            slot_subdomain: Vec::new(),
+            entries: vec![Vec::new(); decomposition.subdomains.len()],
+            copies: local_copies(decomposition),
+            idle_pairs: 0,
+        };
+        for key in keys {
+            let single = Cluster { nodes: BTreeSet::from([key]), pairs: Vec::new() };
+            let cluster = clusters.get(&key).unwrap_or(&single);
+            let mut rows = Vec::new();
+            let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
+            for interface in cluster.nodes.iter().filter_map(|&number| node(number)) {
+                let fixed = dirichlet::fixed(interface, supports)?;
+                rows.extend(gluing::rows(interface));
+                rows.extend(dirichlet::rows(interface, &fixed));
+                sides.insert(interface.node, (interface, fixed));
+            }
+            for &pair in &cluster.pairs {
+                let (slave, master) = (sides[&pairs[pair].slave], sides[&pairs[pair].master]);
+                match contact::row(pair, &pairs[pair], slave, master) {
+                    Some(row) => rows.push(row),
+                    None => result.idle_pairs += 1,
+                }
+            }
+            let subdomains: BTreeSet<u32> = sides.values().flat_map(|(n, _)| n.copies.iter().copied()).collect();
+            result.push_block(rows, subdomains.into_iter().collect(), decomposition);
+        }
+        Ok(result)
+    }
+
+    /// Appends the rows of a block; nothing if it has none.
+    fn push_block(&mut self, rows: Vec<Row>, subdomains: Vec<u32>, decomposition: &Decomposition) {
+        if rows.is_empty() {
+            return;
+        }
+        self.blocks.push(self.rows.len()..self.rows.len() + rows.len());
+        self.block_subdomains.push(subdomains);
+        for mut row in rows {
+            let number = self.rows.len() as u32;
+            let mut terms = std::mem::take(&mut row.terms);
+            terms.sort_by_key(|t| (t.subdomain, t.node, t.axis));
+            for part in terms.chunk_by(|a, b| a.subdomain == b.subdomain) {
+                let slot = self.slot_subdomain.len() as u32;
+                self.slot_subdomain.push(part[0].subdomain);
+                let Some(own) = decomposition.own_index(part[0].subdomain) else { continue };
+                for term in part {
+                    let local = decomposition.subdomains[own].local_node(term.node).expect("a copy is in its subdomain");
+                    let dof = (3 * local + term.axis) as u32;
+                    self.entries[own].push(Entry { row: number, slot, dof, value: term.value });
+                }
+            }
+            self.slot_begin.push(self.slot_subdomain.len() as u32);
+            self.rows.push(row);
+        }
+    }
+
+    /// Slots of a row.
+    pub fn slots(&self, row: usize) -> std::ops::Range<usize> {
+        self.slot_begin[row] as usize..self.slot_begin[row + 1] as usize
+    }
+}
+
+/// Copies and surfaces of all nodes in contact, on every rank.
+fn gather_nodes(comm: &dyn Comm, decomposition: &Decomposition, pairs: &[ContactPair]) -> BTreeMap<u64, InterfaceNode> {
+    let wanted: BTreeSet<u64> = pairs.iter().flat_map(|p| [p.slave, p.master]).collect();
+    let mut mine = Vec::new();
+    for node in decomposition.interface.iter().filter(|n| wanted.contains(&n.node)) {
+        // The rank of the lowest copy speaks for the node.
+        if decomposition.own_index(node.copies[0]).is_some() {
+            node.pack(&mut mine);
+        }
+    }
+    InterfaceNode::unpack(&all_gather_u64(comm, &mine)).into_iter().map(|node| (node.node, node)).collect()
+}
+
+/// Connected components of the nodes under the contact pairs, named by their lowest node.
+fn clusters(pairs: &[ContactPair]) -> (HashMap<u64, u64>, BTreeMap<u64, Cluster>) {
+    let mut parent: HashMap<u64, u64> = HashMap::new();
+    fn root(parent: &mut HashMap<u64, u64>, node: u64) -> u64 {
+        let up = *parent.entry(node).or_insert(node);
+        if up == node {
+            return node;
+        }
+        let top = root(parent, up);
+        parent.insert(node, top);
+        top
+    }
+    for pair in pairs {
+        let (a, b) = (root(&mut parent, pair.slave), root(&mut parent, pair.master));
+        parent.insert(a.max(b), a.min(b));
+    }
+    let mut clusters: BTreeMap<u64, Cluster> = BTreeMap::new();
+    let mut names = HashMap::new();
+    for node in parent.keys().copied().collect::<Vec<_>>() {
+        let name = root(&mut parent, node);
+        names.insert(node, name);
+        clusters.entry(name).or_default().nodes.insert(node);
+    }
+    for (number, pair) in pairs.iter().enumerate() {
+        clusters.entry(names[&pair.slave]).or_default().pairs.push(number);
+    }
+    (names, clusters)
+}
+
+/// For each own subdomain, its nodes with several copies and how many.
+fn local_copies(decomposition: &Decomposition) -> Vec<Vec<(u32, u32)>> {
+    let mut copies = vec![Vec::new(); decomposition.subdomains.len()];
+    for node in decomposition.interface.iter().filter(|n| n.copies.len() > 1) {
+        for own in node.copies.iter().filter_map(|&s| decomposition.own_index(s)) {
+            let local = decomposition.subdomains[own].local_node(node.node).expect("a copy is in its subdomain");
+            copies[own].push((local as u32, node.copies.len() as u32));
+        }
+    }
+    copies
+}

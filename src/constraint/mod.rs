@@ -1,0 +1,138 @@
+//! The rows of B: gluing of copies, supports and contact, orthonormal (`B B' = I` where a node meets one contact).
+//!
+//! Rows that share a node form a *block*: the gluing and support rows of a node, together with those of the nodes
+//! that contact ties to it. A rank holds every row of every block that one of its subdomains touches, so whatever
+//! couples the rows of a block is local. Rows, their order and their coefficients do not depend on the ranks.
+//!
+//! Supports and contact act on the mean over the copies and are therefore orthogonal to gluing (design: "Constraint
+//! rows"). The counts are those of the paper's Table 2: gluing `copies - 1` a component, one support row a node and
+//! component, one contact row a slave node.
+
+pub mod blocks;
+pub mod contact;
+pub mod dirichlet;
+pub mod gluing;
+
+use std::ops::Range;
+
+use thiserror::Error;
+
+/// What a row stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Copies of a node move together.
+    Gluing,
+    /// A component of the displacement is prescribed.
+    Support {
+        /// Index of the support in the scene.
+        support: usize,
+        /// Component.
+        axis: usize,
+    },
+    /// Two surfaces do not penetrate: the multiplier is at least zero.
+    Contact {
+        /// Index of the contact pair.
+        pair: usize,
+    },
+}
+
+/// A coefficient of a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Term {
+    /// Subdomain of the copy.
+    pub subdomain: u32,
+    /// Global node.
+    pub node: u64,
+    /// Component of the displacement.
+    pub axis: usize,
+    /// The coefficient.
+    pub value: f64,
+}
+
+/// One row: `sum of terms = rhs`, or `<= rhs` for contact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What it stands for.
+    pub kind: Kind,
+    /// Right-hand side (length, times `scale`).
+    pub rhs: f64,
+    /// Factor that made the row a unit vector: physical nodal force = `scale` times multiplier.
+    pub scale: f64,
+    /// Its coefficients.
+    pub terms: Vec<Term>,
+}
+
+impl Row {
+    /// Whether the multiplier is bounded below by zero.
+    pub fn is_inequality(&self) -> bool {
+        matches!(self.kind, Kind::Contact { .. })
+    }
+}
+
+/// A prescribed displacement on a named surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Support {
+    /// Name in the scene.
+    pub name: String,
+    /// Index of the named surface.
+    pub surface: usize,
+    /// Components that are fixed.
+    pub fixed: [bool; 3],
+    /// Their values (length).
+    pub displacement: [f64; 3],
+}
+
+/// A coefficient of B in local numbering.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    /// Row on this rank.
+    pub row: u32,
+    /// Which of the row's slots collects this subdomain's contribution.
+    pub slot: u32,
+    /// Local unknown, `3 node + axis`.
+    pub dof: u32,
+    /// The coefficient.
+    pub value: f64,
+}
+
+/// The rows that one rank holds.
+pub struct Constraints {
+    /// Rows, block by block in the order of the blocks' lowest nodes. Terms are empty: they are in `entries`.
+    pub rows: Vec<Row>,
+    /// Rows of each block.
+    pub blocks: Vec<Range<usize>>,
+    /// Subdomains of each block, ascending.
+    pub block_subdomains: Vec<Vec<u32>>,
+    /// First slot of each row, and the end. A slot is one subdomain's part in a row.
+    pub slot_begin: Vec<u32>,
+    /// Subdomain of each slot; ascending within a row.
+    pub slot_subdomain: Vec<u32>,
+    /// Coefficients of each own subdomain, by row.
+    pub entries: Vec<Vec<Entry>>,
+    /// Own nodes with copies elsewhere or rows: for each own subdomain (local node, number of copies) where > 1.
+    pub copies: Vec<Vec<(u32, u32)>>,
+    /// Number of contact pairs without a row, because supports fix both nodes along the normal.
+    pub idle_pairs: usize,
+}
+
+/// Why the rows cannot be set up.
+#[derive(Debug, Error, PartialEq)]
+pub enum ConstraintError {
+    /// Two supports prescribe different values at one node.
+    #[error(
+        "support.{first} and support.{second} prescribe different displacements along {axis} where their surfaces \
+         meet ({first_value} and {second_value}); make them equal, or leave {axis} out of one"
+    )]
+    Conflict {
+        /// One support.
+        first: String,
+        /// The other.
+        second: String,
+        /// Component.
+        axis: char,
+        /// Value of the one.
+        first_value: f64,
+        /// Value of the other.
+        second_value: f64,
+    },
+}

@@ -1,0 +1,166 @@
+//! Pairs of coinciding meshes: every slave node that has a master node opposite along its normal.
+//!
+//! Slave nodes beyond the edge of the master surface carry no contact. Surfaces whose nodes do not match are refused.
+
+use std::collections::HashMap;
+
+use super::surface::{GatheredSurface, difference, dot};
+use super::{ContactError, ContactPair};
+
+/// How far, in edge lengths of the master surface, a master node may lie beside the slave node's normal.
+const TOLERANCE: f64 = 1e-6;
+
+/// Pairs of contact number `contact`, ascending by slave node.
+///
+/// # Errors
+/// If the surfaces do not match, or do not face each other at all.
+pub fn pair(
+    contact: usize,
+    name: &str,
+    slave: &GatheredSurface,
+    master: &GatheredSurface,
+) -> Result<Vec<ContactPair>, ContactError> {
+    let spacing = master.spacing();
+    let grid = Grid::new(&master.points, spacing);
+    let mut pairs = Vec::new();
+    let mut unmatched = 0;
+    for (index, (normal, area)) in slave.normals_and_areas().into_iter().enumerate() {
+        let point = slave.points[index];
+        match grid.opposite(point, normal) {
+            Some((found, gap)) => {
+                let (slave, master) = (slave.nodes[index], master.nodes[found]);
+                pairs.push(ContactPair { contact, slave, master, normal, gap, area });
+            }
+            None => unmatched += usize::from(hits(master, point, normal, spacing)),
+        }
+    }
+    if unmatched > 0 {
+        let slaves = slave.nodes.len();
+        return Err(ContactError::NotMatching { name: name.to_owned(), unmatched, slaves });
+    }
+    if pairs.is_empty() {
+        return Err(ContactError::Apart { name: name.to_owned() });
+    }
+    Ok(pairs)
+}
+
+/// Points sorted into cubes of one edge length.
+struct Grid<'a> {
+    points: &'a [[f64; 3]],
+    spacing: f64,
+    cubes: HashMap<[i64; 3], Vec<usize>>,
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+impl<'a> Grid<'a> {
+    fn new(points: &'a [[f64; 3]], spacing: f64) -> Self {
+        let mut cubes: HashMap<_, Vec<usize>> = HashMap::new();
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for (index, point) in points.iter().enumerate() {
+            cubes.entry(point.map(|x| (x / spacing).floor() as i64)).or_default().push(index);
+            for a in 0..3 {
+                low[a] = low[a].min(point[a]);
+                high[a] = high[a].max(point[a]);
+            }
+        }
+        Self { points, spacing, cubes, low, high }
+    }
+
+    /// The nearest point on the line through `point` along `normal`, and its signed distance.
+    fn opposite(&self, point: [f64; 3], normal: [f64; 3]) -> Option<(usize, f64)> {
+        let middle: [f64; 3] = std::array::from_fn(|a| 0.5 * (self.low[a] + self.high[a]));
+        let half: [f64; 3] = std::array::from_fn(|a| 0.5 * (self.high[a] - self.low[a]));
+        let reach = dot(difference(middle, point), difference(middle, point)).sqrt() + dot(half, half).sqrt();
+        let steps = (reach / self.spacing).ceil() as i64 + 1;
+        (0..=steps).flat_map(|k| [k, -k]).find_map(|k| {
+            let at: [f64; 3] = std::array::from_fn(|a| point[a] + k as f64 * self.spacing * normal[a]);
+            let outside = |a: usize| at[a] < self.low[a] - 2.0 * self.spacing || at[a] > self.high[a] + 2.0 * self.spacing;
+            if (0..3).any(outside) { None } else { self.nearby(point, normal, at) }
+        })
+    }
+
+    /// The best point on the line among those in the cubes around `at`.
+    fn nearby(&self, point: [f64; 3], normal: [f64; 3], at: [f64; 3]) -> Option<(usize, f64)> {
+        let cube = at.map(|x| (x / self.spacing).floor() as i64);
+        (0..27)
+            .filter_map(|n| self.cubes.get(&[cube[0] + n % 3 - 1, cube[1] + n / 3 % 3 - 1, cube[2] + n / 9 - 1]))
+            .flatten()
+            .filter_map(|&index| {
+                let arm = difference(self.points[index], point);
+                let gap = dot(arm, normal);
+                let beside: [f64; 3] = std::array::from_fn(|a| arm[a] - gap * normal[a]);
+                (dot(beside, beside).sqrt() <= TOLERANCE * self.spacing).then_some((index, gap))
+            })
+            .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()).then(a.0.cmp(&b.0)))
+    }
+}
+
+/// Whether the line through `point` along `normal` passes through the inside of the surface.
+fn hits(surface: &GatheredSurface, point: [f64; 3], normal: [f64; 3], spacing: f64) -> bool {
+    surface.triangles.iter().any(|triangle| {
+        let [a, b, c] = triangle.map(|corner| {
+            let arm = difference(surface.points[corner], point);
+            let along = dot(arm, normal);
+            std::array::from_fn::<f64, 3, _>(|i| arm[i] - along * normal[i])
+        });
+        // Twice the signed areas, seen along the normal, of the triangles that the line makes with each edge.
+        let side = |p: [f64; 3], q: [f64; 3]| {
+            dot(normal, [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]])
+        };
+        let inside = 1e-3 * spacing * spacing;
+        let areas = [side(a, b), side(b, c), side(c, a)];
+        areas.iter().all(|&s| s > inside) || areas.iter().all(|&s| s < -inside)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flat square of `n` x `n` cells at height `z`, normals along `up`.
+    fn square(n: usize, size: f64, z: f64, up: bool, first: u64) -> GatheredSurface {
+        let node = |i: usize, j: usize| i + (n + 1) * j;
+        let mut triangles = Vec::new();
+        for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
+            let quad = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+            for t in [[0, 1, 2], [0, 2, 3]] {
+                let [a, b, c] = t.map(|k| quad[k]);
+                triangles.push(if up { [a, b, c] } else { [a, c, b] });
+            }
+        }
+        let h = size / n as f64;
+        let points = (0..(n + 1) * (n + 1)).map(|k| [(k % (n + 1)) as f64 * h, (k / (n + 1)) as f64 * h, z]).collect();
+        GatheredSurface { nodes: (0..((n + 1) * (n + 1)) as u64).map(|k| first + k).collect(), points, triangles }
+    }
+
+    #[test]
+    fn matching_squares_pair_with_gap_normal_and_area() {
+        for gap in [0.0, 0.3, 7.0, -0.2] {
+            let pairs = pair(0, "joint", &square(4, 1.0, gap, false, 100), &square(4, 1.0, 0.0, true, 0)).unwrap();
+            assert_eq!(pairs.len(), 25);
+            for p in &pairs {
+                assert_eq!(p.slave, p.master + 100);
+                assert_eq!(p.normal, [0.0, 0.0, -1.0]);
+                assert!((p.gap - gap).abs() < 1e-14);
+            }
+            assert!((pairs.iter().map(|p| p.area).sum::<f64>() - 1.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn nodes_beyond_the_master_carry_no_contact() {
+        let pairs = pair(0, "joint", &square(4, 2.0, 0.0, false, 100), &square(2, 1.0, 0.0, true, 0)).unwrap();
+        assert_eq!(pairs.len(), 9);
+    }
+
+    #[test]
+    fn other_meshes_are_refused() {
+        let error = pair(0, "joint", &square(3, 1.0, 0.0, false, 100), &square(2, 1.0, 0.0, true, 0)).unwrap_err();
+        assert!(matches!(error, ContactError::NotMatching { unmatched, slaves: 16, .. } if unmatched > 0));
+        let mut far = square(2, 1.0, 0.0, true, 0);
+        far.points.iter_mut().for_each(|p| p[0] += 10.0);
+        let error = pair(0, "joint", &square(2, 1.0, 0.0, false, 100), &far).unwrap_err();
+        assert_eq!(error, ContactError::Apart { name: "joint".into() });
+    }
+}

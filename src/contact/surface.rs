@@ -1,0 +1,81 @@
+//! A named surface, gathered from all subdomains.
+
+use crate::comm::{Comm, all_gather_u64};
+use crate::decomposition::Subdomain;
+
+/// Triangles and nodes of a surface, the same on every rank.
+pub struct GatheredSurface {
+    /// Global node numbers, ascending.
+    pub nodes: Vec<u64>,
+    /// Their coordinates.
+    pub points: Vec<[f64; 3]>,
+    /// Corners as indices into `nodes`, counter-clockwise from outside.
+    pub triangles: Vec<[usize; 3]>,
+}
+
+impl GatheredSurface {
+    /// Gathers surface number `surface`. Triangles come in subdomain order, whatever the ranks. Collective.
+    pub fn gather(comm: &dyn Comm, subdomains: &[Subdomain], surface: usize) -> Self {
+        let mut mine = Vec::new();
+        for subdomain in subdomains {
+            for facet in subdomain.facets.iter().filter(|f| f.surface == surface) {
+                for node in facet.nodes.map(|n| n as usize) {
+                    mine.push(subdomain.nodes[node]);
+                    mine.extend(subdomain.points[node].map(f64::to_bits));
+                }
+            }
+        }
+        let all = all_gather_u64(comm, &mine);
+        let mut corners: Vec<(u64, [f64; 3])> =
+            all.chunks_exact(4).map(|c| (c[0], [1, 2, 3].map(|a| f64::from_bits(c[a])))).collect();
+        let order: Vec<u64> = corners.iter().map(|c| c.0).collect();
+        corners.sort_by_key(|c| c.0);
+        corners.dedup_by_key(|c| c.0);
+        let (nodes, points): (Vec<u64>, Vec<[f64; 3]>) = corners.into_iter().unzip();
+        let index = |node: &u64| nodes.binary_search(node).expect("every corner is listed");
+        let triangles = order.chunks_exact(3).map(|t| [index(&t[0]), index(&t[1]), index(&t[2])]).collect();
+        Self { nodes, points, triangles }
+    }
+
+    /// Area vectors of the triangles (half the cross product of two edges).
+    fn area_vectors(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.triangles.iter().map(|t| {
+            let [a, b, c] = t.map(|corner| self.points[corner]);
+            let (p, q) = (difference(b, a), difference(c, a));
+            [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]].map(|x| 0.5 * x)
+        })
+    }
+
+    /// Unit normal and share of the area (a third of the adjacent triangles) of each node.
+    pub fn normals_and_areas(&self) -> Vec<([f64; 3], f64)> {
+        let mut sums = vec![([0.0; 3], 0.0); self.nodes.len()];
+        for (triangle, vector) in self.triangles.iter().zip(self.area_vectors()) {
+            for &corner in triangle {
+                let (normal, area) = &mut sums[corner];
+                (0..3).for_each(|a| normal[a] += vector[a]);
+                *area += dot(vector, vector).sqrt() / 3.0;
+            }
+        }
+        for (normal, _) in &mut sums {
+            let length = dot(*normal, *normal).sqrt();
+            *normal = normal.map(|n| n / length);
+        }
+        sums
+    }
+
+    /// Typical edge length: root of twice the mean triangle area.
+    pub fn spacing(&self) -> f64 {
+        let total: f64 = self.area_vectors().map(|v| dot(v, v).sqrt()).sum();
+        (2.0 * total / self.triangles.len().max(1) as f64).sqrt()
+    }
+}
+
+/// `a - b`.
+pub fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+/// `a . b`.
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,55 @@
+//! Face-connectivity of a partition: two elements are neighbours only if they share a whole face.
+//!
+//! A part that falls into pieces, or hangs together by an edge or a vertex only, has more than six rigid body modes.
+
+/// Splits every part into its face-connected pieces. `parts[e]` is the part of element `e`; `begin` and `neighbours`
+/// are the dual graph in compressed rows. Pieces are numbered consecutively in the order of their parts (empty parts
+/// vanish), within a part by first element. Returns the number of pieces.
+pub fn split_into_pieces(parts: &mut [i32], begin: &[i32], neighbours: &[i32]) -> usize {
+    let mut pieces = vec![usize::MAX; parts.len()];
+    let mut part_of_piece = Vec::new();
+    let mut stack = Vec::new();
+    for seed in 0..parts.len() {
+        if pieces[seed] != usize::MAX {
+            continue;
+        }
+        let piece = part_of_piece.len();
+        part_of_piece.push(parts[seed]);
+        pieces[seed] = piece;
+        stack.push(seed);
+        while let Some(element) = stack.pop() {
+            for &other in &neighbours[begin[element] as usize..begin[element + 1] as usize] {
+                let other = other as usize;
+                if pieces[other] == usize::MAX && parts[other] == parts[element] {
+                    pieces[other] = piece;
+                    stack.push(other);
+                }
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..part_of_piece.len()).collect();
+    order.sort_by_key(|&piece| (part_of_piece[piece], piece));
+    let mut number = vec![0; order.len()];
+    for (new, &piece) in order.iter().enumerate() {
+        number[piece] = new as i32;
+    }
+    for (part, piece) in parts.iter_mut().zip(pieces) {
+        *part = number[piece];
+    }
+    order.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::split_into_pieces;
+
+    #[test]
+    fn a_part_in_two_pieces_becomes_two_and_empty_parts_vanish() {
+        // A chain of five elements; part 0 holds both ends, part 2 is empty.
+        let begin = [0, 1, 3, 5, 7, 8];
+        let neighbours = [1, 0, 2, 1, 3, 2, 4, 3];
+        let mut parts = [0, 1, 1, 3, 0];
+        assert_eq!(split_into_pieces(&mut parts, &begin, &neighbours), 4);
+        assert_eq!(parts, [0, 2, 2, 3, 1]);
+    }
+}

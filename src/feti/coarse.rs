@@ -1,0 +1,277 @@
+//! `G = R'B'` and the coarse problem `G G' a = r`: six unknowns a subdomain.
+//!
+//! `G x` is local to each subdomain; one all-gather brings it to every rank, each of which holds the sparse Cholesky
+//! factor of `G G'` and solves redundantly: ranks agree to the last bit, and `G'a` needs no further exchange.
+
+use std::collections::BTreeMap;
+
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::prelude::MatMut;
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, Par, Side, Spec};
+use thiserror::Error;
+
+use super::gather::Gather;
+use super::kernel::RigidModes;
+use crate::comm::{Comm, Shares, all_gather_u64};
+use crate::constraint::Constraints;
+use crate::decomposition::Subdomain;
+
+/// Rigid modes a subdomain.
+pub const MODES: usize = 6;
+
+/// The constraints leave a rigid motion free.
+#[derive(Debug, Error, PartialEq, Eq)]
+#[error(
+    "the supports and contacts do not hold all bodies: the coarse problem is singular near subdomain {subdomain}; \
+     add a support, or bring the contact surfaces together"
+)]
+pub struct Floating {
+    /// Where the factorisation of `G G'` broke down.
+    pub subdomain: usize,
+}
+
+/// `G` and the factor of `G G'`.
+pub struct Coarse<'a> {
+    comm: &'a dyn Comm,
+    counts: Vec<usize>,
+    /// Rows of `G'`: for each slot of each row, the subdomain and its six modes' values.
+    slot_begin: Vec<u32>,
+    slot_subdomain: Vec<u32>,
+    slot_modes: Vec<[f64; MODES]>,
+    /// For each own subdomain, its (row, slot) in row order.
+    own_slots: Vec<Vec<(u32, u32)>>,
+    factor: CoarseFactor,
+}
+
+impl<'a> Coarse<'a> {
+    /// Computes `G` and factorises `G G'`. Collective.
+    ///
+    /// # Errors
+    /// If `G G'` is singular: on every rank.
+    pub fn new(
+        comm: &'a dyn Comm,
+        shares: &Shares,
+        subdomains: &[Subdomain],
+        modes: &[RigidModes],
+        constraints: &Constraints,
+        gather: &Gather,
+    ) -> Result<Self, Floating> {
+        let slots = constraints.slot_subdomain.len();
+        let mut slot_modes = vec![[0.0; MODES]; slots];
+        gather.exchange(
+            MODES,
+            |own, slots| {
+                for entry in gather.entries(own) {
+                    let (node, axis) = (entry.dof as usize / 3, entry.dof as usize % 3);
+                    let row = modes[own].at(subdomains[own].points[node])[axis];
+                    let at = MODES * entry.slot as usize;
+                    slots[at..at + MODES].iter_mut().zip(row).for_each(|(s, r)| *s += entry.value * r);
+                }
+            },
+            |row, values| {
+                for (slot, six) in constraints.slots(row).zip(values.chunks_exact(MODES)) {
+                    slot_modes[slot].copy_from_slice(six);
+                }
+            },
+        );
+        let own_slots = gather_own_slots(constraints, gather, subdomains.len());
+        let first = shares.begin(comm.rank());
+        let blocks = own_blocks(constraints, &slot_modes, &own_slots, first);
+        let factor = CoarseFactor::new(&share_blocks(comm, &blocks), shares.total())?;
+        Ok(Self {
+            comm,
+            counts: shares.counts(MODES),
+            slot_begin: constraints.slot_begin.clone(),
+            slot_subdomain: constraints.slot_subdomain.clone(),
+            slot_modes,
+            own_slots,
+            factor,
+        })
+    }
+
+    /// `G rows`, whole on every rank. One all-gather.
+    pub fn apply(&self, rows: &[f64]) -> Vec<f64> {
+        let mut mine = vec![0.0; MODES * self.own_slots.len()];
+        for (sum, slots) in mine.chunks_exact_mut(MODES).zip(&self.own_slots) {
+            for &(row, slot) in slots {
+                let x = rows[row as usize];
+                sum.iter_mut().zip(&self.slot_modes[slot as usize]).for_each(|(s, g)| *s += g * x);
+            }
+        }
+        self.share(&mine)
+    }
+
+    /// Brings six numbers an own subdomain to every rank.
+    pub fn share(&self, mine: &[f64]) -> Vec<f64> {
+        self.comm.all_gather(mine, &self.counts)
+    }
+
+    /// `(G G')^-1 a`, in place. Local.
+    pub fn solve(&mut self, a: &mut [f64]) {
+        self.factor.solve(a);
+    }
+
+    /// `rows += factor G' a`. Local.
+    pub fn add_transpose(&self, factor: f64, a: &[f64], rows: &mut [f64]) {
+        for (row, x) in rows.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for slot in self.slot_begin[row] as usize..self.slot_begin[row + 1] as usize {
+                let at = MODES * self.slot_subdomain[slot] as usize;
+                sum += self.slot_modes[slot].iter().zip(&a[at..at + MODES]).map(|(g, a)| g * a).sum::<f64>();
+            }
+            *x += factor * sum;
+        }
+    }
+}
+
+/// For each own subdomain, the rows it takes part in and its slots there.
+fn gather_own_slots(constraints: &Constraints, gather: &Gather, own: usize) -> Vec<Vec<(u32, u32)>> {
+    (0..own)
+        .map(|own| {
+            let mut slots: Vec<(u32, u32)> = gather.entries(own).iter().map(|e| (e.row, e.slot)).collect();
+            slots.dedup();
+            debug_assert!(slots.iter().all(|&(row, slot)| constraints.slots(row as usize).contains(&(slot as usize))));
+            slots
+        })
+        .collect()
+}
+
+/// A 6x6 block of `G G'`, by `(row, column)` subdomain.
+type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;
+
+/// Block rows of `G G'` that belong to own subdomains, lower triangle. Complete: every row of a subdomain is here.
+fn own_blocks(
+    constraints: &Constraints,
+    slot_modes: &[[f64; MODES]],
+    own_slots: &[Vec<(u32, u32)>],
+    first: usize,
+) -> Blocks {
+    let mut blocks = Blocks::new();
+    for (own, slots) in own_slots.iter().enumerate() {
+        for &(row, slot) in slots {
+            for other in constraints.slots(row as usize) {
+                let column = constraints.slot_subdomain[other] as usize;
+                if column > first + own {
+                    continue;
+                }
+                let block = blocks.entry((first + own, column)).or_insert([0.0; MODES * MODES]);
+                for (i, a) in slot_modes[slot as usize].iter().enumerate() {
+                    for (j, b) in slot_modes[other].iter().enumerate() {
+                        block[MODES * i + j] += a * b;
+                    }
+                }
+            }
+        }
+    }
+    blocks
+}
+
+/// The blocks of all ranks, on every rank.
+fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
+    let mut message = Vec::new();
+    for ((row, column), block) in blocks {
+        message.extend([*row as u64, *column as u64]);
+        message.extend(block.map(f64::to_bits));
+    }
+    all_gather_u64(comm, &message)
+        .chunks_exact(2 + MODES * MODES)
+        .map(|m| ((m[0] as usize, m[1] as usize), std::array::from_fn(|k| f64::from_bits(m[2 + k]))))
+        .collect()
+}
+
+/// Sparse Cholesky factor of `G G'`.
+struct CoarseFactor {
+    symbolic: SymbolicCholesky<u32>,
+    values: Vec<f64>,
+    scratch: MemBuffer,
+}
+
+impl CoarseFactor {
+    fn new(blocks: &Blocks, subdomains: usize) -> Result<Self, Floating> {
+        let n = MODES * subdomains;
+        let mut columns: Vec<Vec<(u32, f64)>> = vec![Vec::new(); n];
+        for (&(row, column), block) in blocks {
+            for i in 0..MODES {
+                for j in (0..MODES).filter(|&j| row != column || j <= i) {
+                    columns[MODES * column + j].push(((MODES * row + i) as u32, block[MODES * i + j]));
+                }
+            }
+        }
+        let mut begins = vec![0];
+        let (mut rows, mut values) = (Vec::new(), Vec::new());
+        for mut column in columns {
+            column.sort_unstable_by_key(|entry| entry.0);
+            rows.extend(column.iter().map(|entry| entry.0));
+            values.extend(column.iter().map(|entry| entry.1));
+            begins.push(rows.len() as u32);
+        }
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &begins, None, &rows);
+        let symbolic =
+            factorize_symbolic_cholesky(pattern, Side::Lower, SymmetricOrdering::Amd, Default::default())
+                .expect("the coarse factor fits in memory and its index type");
+        let scratch = StackReq::any_of(&[
+            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+        ]);
+        let mut scratch = MemBuffer::new(scratch);
+        let mut factor = vec![0.0; symbolic.len_val()];
+        let matrix = SparseColMatRef::new(pattern, &values[..]);
+        let regularization = LltRegularization::default();
+        let stack = MemStack::new(&mut scratch);
+        let outcome = symbolic
+            .factorize_numeric_llt(&mut factor, matrix, Side::Lower, regularization, Par::Seq, stack, Spec::default())
+            .map(|_| ());
+        // Round-off can hide a free motion: a pivot far below the largest is one.
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let weakest = probe(&symbolic, &factor, &mut scratch, outcome.is_ok(), n);
+        if outcome.is_err() || !(weakest.1 * largest < 1.0 / SINGULAR) {
+            return Err(Floating { subdomain: weakest.0 / MODES });
+        }
+        Ok(Self { symbolic, values: factor, scratch })
+    }
+
+    fn solve(&mut self, a: &mut [f64]) {
+        let n = a.len();
+        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(a, n, 1),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+        );
+    }
+}
+
+/// A coarse problem conditioned worse than the inverse of this leaves a motion free.
+const SINGULAR: f64 = 1e-12;
+
+/// Largest entry of `(G G')^-1` times a vector of ones and alternating signs, and where it is: infinite where the
+/// factorisation failed.
+fn probe(
+    symbolic: &SymbolicCholesky<u32>,
+    factor: &[f64],
+    scratch: &mut MemBuffer,
+    factorised: bool,
+    n: usize,
+) -> (usize, f64) {
+    if !factorised {
+        return (0, f64::INFINITY);
+    }
+    // Signs without a pattern that a rigid motion could be orthogonal to.
+    let mut x: Vec<f64> = (0..n).map(|k| if (k * k + k / 3) % 7 < 3 { 1.0 } else { -1.0 }).collect();
+    LltRef::new(symbolic, factor).solve_in_place_with_conj(
+        Conj::No,
+        MatMut::from_column_major_slice_mut(&mut x, n, 1),
+        Par::Seq,
+        MemStack::new(scratch),
+    );
+    let mut worst = (0, 0.0);
+    for (k, value) in x.iter().enumerate() {
+        if !(value.abs() <= worst.1) {
+            worst = (k, value.abs());
+        }
+    }
+    (worst.0, worst.1 / (n as f64).sqrt())
+}

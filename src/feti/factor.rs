@@ -1,0 +1,217 @@
+//! `K^+`: a generalised inverse of each subdomain's singular stiffness matrix by plain sparse Cholesky.
+//!
+//! With `Q` the orthogonal projector onto the rigid modes restricted to a few well-spread fixing nodes, `K + rho Q` is
+//! positive definite and its inverse is a generalised inverse of `K` (Brzobohaty, Kozubek, Markopoulos, Dostal 2011).
+//! No null pivots are sought. Symbolic analysis is done once and shared by subdomains of equal connectivity.
+
+use std::rc::Rc;
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::perm::PermRef;
+use faer::prelude::MatMut;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, Par, Side, Spec};
+use thiserror::Error;
+
+use super::kernel::RigidModes;
+use super::ordering::nested_dissection;
+use crate::assembly::pattern::Pattern;
+use crate::decomposition::Subdomain;
+
+/// Number of fixing nodes: as many as a box has corners.
+const FIXING_NODES: usize = 8;
+
+/// The stiffness matrix lost its definiteness (up to rigid motions).
+#[derive(Debug, Error, PartialEq, Eq)]
+#[error(
+    "subdomain {subdomain}: the stiffness matrix is not positive definite (pivot {pivot} of {dofs}); \
+     check for elements without volume, and for a hardening modulus of zero at the collapse load"
+)]
+pub struct NotDefinite {
+    /// The subdomain.
+    pub subdomain: usize,
+    /// Column where the factorisation broke down, in elimination order.
+    pub pivot: usize,
+    /// Number of unknowns.
+    pub dofs: usize,
+}
+
+/// What subdomains of equal connectivity and shape have in common.
+pub struct Symbolic {
+    /// Sparsity of `K + rho Q`.
+    pub pattern: Pattern,
+    /// Local fixing nodes.
+    fixing: Vec<u32>,
+    cholesky: SymbolicCholesky<u32>,
+}
+
+impl Symbolic {
+    /// Analyses a subdomain.
+    pub fn new(subdomain: &Subdomain) -> Self {
+        let fixing = fixing_nodes(&subdomain.points);
+        let pattern = Pattern::new(subdomain.nodes.len(), &subdomain.elements, &fixing);
+        let n = pattern.dofs();
+        let (forward, inverse) = nested_dissection(&pattern.adjacency);
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        let cholesky = factorize_symbolic_cholesky(
+            SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_begin, None, &pattern.rows),
+            Side::Lower,
+            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, n)),
+            params,
+        )
+        .expect("a subdomain's factor fits in memory and its index type");
+        Self { pattern, fixing, cholesky }
+    }
+
+    /// Whether a subdomain may share this analysis.
+    fn fits(&self, subdomain: &Subdomain, of: &Subdomain) -> bool {
+        subdomain.elements == of.elements && fixing_nodes(&subdomain.points) == self.fixing
+    }
+
+    /// Doubles in the factor.
+    pub fn factor_length(&self) -> usize {
+        self.cholesky.len_val()
+    }
+}
+
+/// Analyses all subdomains, sharing among those of equal connectivity.
+pub fn analyse(subdomains: &[Subdomain]) -> Vec<Rc<Symbolic>> {
+    let mut kinds: Vec<(usize, Rc<Symbolic>)> = Vec::new();
+    subdomains
+        .iter()
+        .enumerate()
+        .map(|(own, subdomain)| {
+            if let Some((_, shared)) = kinds.iter().find(|(of, kind)| kind.fits(subdomain, &subdomains[*of])) {
+                return Rc::clone(shared);
+            }
+            let new = Rc::new(Symbolic::new(subdomain));
+            kinds.push((own, Rc::clone(&new)));
+            new
+        })
+        .collect()
+}
+
+/// Numeric factors of all own subdomains.
+pub struct Factors {
+    symbolic: Vec<Rc<Symbolic>>,
+    values: Vec<Vec<f64>>,
+    scratch: MemBuffer,
+    shifted: Vec<f64>,
+}
+
+impl Factors {
+    /// Space for the factors; nothing is factorised yet.
+    pub fn new(symbolic: Vec<Rc<Symbolic>>) -> Self {
+        let scratch = faer::dyn_stack::StackReq::any_of(
+            &symbolic
+                .iter()
+                .flat_map(|s| {
+                    [
+                        s.cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
+                        s.cholesky.solve_in_place_scratch::<f64>(1, Par::Seq),
+                    ]
+                })
+                .collect::<Vec<_>>(),
+        );
+        let values = symbolic.iter().map(|s| vec![0.0; s.cholesky.len_val()]).collect();
+        Self { symbolic, values, scratch: MemBuffer::new(scratch), shifted: Vec::new() }
+    }
+
+    /// Symbolic analysis of an own subdomain.
+    pub fn symbolic(&self, own: usize) -> &Symbolic {
+        &self.symbolic[own]
+    }
+
+    /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`.
+    ///
+    /// # Errors
+    /// If the matrix is not positive definite, or not finite.
+    pub fn factorise(&mut self, own: usize, subdomain: &Subdomain, stiffness: &[f64]) -> Result<(), NotDefinite> {
+        let Symbolic { pattern, fixing, cholesky } = &*self.symbolic[own];
+        let n = pattern.dofs();
+        self.shifted.clear();
+        self.shifted.extend_from_slice(stiffness);
+        let diagonal = pattern.diagonal(stiffness);
+        let rho = diagonal.iter().sum::<f64>() / n as f64;
+        add_fixing(pattern, fixing, &subdomain.points, rho, &mut self.shifted);
+        let matrix = SparseColMatRef::new(
+            SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_begin, None, &pattern.rows),
+            &self.shifted[..],
+        );
+        let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
+        if !rho.is_finite() {
+            return Err(refuse(0));
+        }
+        cholesky
+            .factorize_numeric_llt(
+                &mut self.values[own],
+                matrix,
+                Side::Lower,
+                LltRegularization::default(),
+                Par::Seq,
+                MemStack::new(&mut self.scratch),
+                Spec::default(),
+            )
+            .map(|_| ())
+            .map_err(|faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index }| refuse(index))
+    }
+
+    /// `x = K^+ x` for one own subdomain.
+    pub fn solve(&mut self, own: usize, x: &mut [f64]) {
+        let n = x.len();
+        LltRef::new(&self.symbolic[own].cholesky, &self.values[own]).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(x, n, 1),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+        );
+    }
+}
+
+/// Adds `rho Q` of the fixing nodes to the lower values of the stiffness.
+fn add_fixing(pattern: &Pattern, fixing: &[u32], points: &[[f64; 3]], rho: f64, values: &mut [f64]) {
+    let corners: Vec<[f64; 3]> = fixing.iter().map(|&n| points[n as usize]).collect();
+    let modes = RigidModes::new(&corners);
+    let at: Vec<_> = corners.iter().map(|&point| modes.at(point)).collect();
+    for (a, &row) in fixing.iter().enumerate() {
+        for (b, &column) in fixing.iter().enumerate().filter(|&(_, &column)| column <= row) {
+            let block = std::array::from_fn(|i| {
+                std::array::from_fn(|j| rho * (0..6).map(|k| at[a][i][k] * at[b][j][k]).sum::<f64>())
+            });
+            pattern.add_block(values, row, column, &block);
+        }
+    }
+}
+
+/// Well-spread nodes: each the farthest from those before it, the first the farthest from the centroid. Round-off does
+/// not decide: congruent subdomains choose alike.
+fn fixing_nodes(points: &[[f64; 3]]) -> Vec<u32> {
+    let square = |p: [f64; 3], q: [f64; 3]| (0..3).map(|a| (p[a] - q[a]).powi(2)).sum::<f64>();
+    let count = points.len() as f64;
+    let centre: [f64; 3] = std::array::from_fn(|a| points.iter().map(|p| p[a]).sum::<f64>() / count);
+    let mut distance: Vec<f64> = points.iter().map(|&p| square(p, centre)).collect();
+    let mut chosen = Vec::new();
+    while chosen.len() < FIXING_NODES.min(points.len()) {
+        let mut best = 0;
+        for (node, &d) in distance.iter().enumerate() {
+            if d > distance[best] * (1.0 + 1e-9) {
+                best = node;
+            }
+        }
+        if chosen.is_empty() {
+            distance.fill(f64::INFINITY);
+        }
+        chosen.push(best as u32);
+        distance.iter_mut().zip(points).for_each(|(d, &p)| *d = d.min(square(p, points[best])));
+    }
+    chosen.sort_unstable();
+    chosen
+}

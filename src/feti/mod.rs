@@ -1,0 +1,16 @@
+//! Total FETI: the dual of a torn problem.
+//!
+//! Notation of the paper: `K` block diagonal stiffness, `B` constraint rows, `R` rigid modes, `G = R'B'`,
+//! `F = B K^+ B'`, `P` the projector onto `Ker G`. Each symbol has a file; none knows of optimisation.
+
+pub mod coarse;
+pub mod factor;
+pub mod gather;
+pub mod kernel;
+pub mod operator;
+pub mod ordering;
+pub mod projector;
+pub mod space;
+
+/// A torn vector: for each own subdomain its local unknowns.
+pub type Torn = Vec<Vec<f64>>;

@@ -1,0 +1,56 @@
+//! Inner products of dual vectors and sums over subdomains, the same bits on any number of ranks.
+//!
+//! Each row counts for the lowest subdomain of its block. Products are summed per subdomain in row order, then over
+//! the subdomains in their order on rank 0.
+
+use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use crate::constraint::Constraints;
+
+/// Inner products over all rows of all ranks.
+pub struct RowSpace<'a> {
+    comm: &'a dyn Comm,
+    shares: Shares,
+    /// For each own subdomain, the rows that count for it.
+    owned: Vec<Vec<u32>>,
+}
+
+impl<'a> RowSpace<'a> {
+    /// Over the rows of `constraints`.
+    pub fn new(comm: &'a dyn Comm, shares: &Shares, constraints: &Constraints) -> Self {
+        let first = shares.begin(comm.rank());
+        let mut owned = vec![Vec::new(); shares.0[comm.rank()]];
+        for (rows, subdomains) in constraints.blocks.iter().zip(&constraints.block_subdomains) {
+            let own = (subdomains[0] as usize).checked_sub(first).and_then(|k| owned.get_mut(k));
+            if let Some(list) = own {
+                list.extend(rows.clone().map(|row| row as u32));
+            }
+        }
+        Self { comm, shares: shares.clone(), owned }
+    }
+
+    /// For each own subdomain, the rows that count for it: every row counts exactly once over all ranks.
+    pub fn owned(&self) -> &[Vec<u32>] {
+        &self.owned
+    }
+
+    /// `x'y` of each pair; one collective.
+    pub fn dots(&self, pairs: &[(&[f64], &[f64])]) -> Vec<f64> {
+        let mut partial = Vec::with_capacity(self.owned.len() * pairs.len());
+        for rows in &self.owned {
+            for (x, y) in pairs {
+                partial.push(rows.iter().map(|&r| x[r as usize] * y[r as usize]).sum());
+            }
+        }
+        self.sum(&partial, pairs.len())
+    }
+
+    /// Sums of `width` values per own subdomain over all subdomains.
+    pub fn sum(&self, partial: &[f64], width: usize) -> Vec<f64> {
+        ordered_sum(self.comm, &self.shares, partial, width)
+    }
+
+    /// Largest value over the ranks; NaN if any is.
+    pub fn maximum(&self, mine: f64) -> f64 {
+        maximum(self.comm, &[mine])[0]
+    }
+}
