@@ -5,4 +5,11 @@
 //! The method is the one of Cermak and Sysala, "Total-FETI method for solving contact elasto-plastic problems".
 
 pub mod comm;
+pub mod element;
+pub mod material;
+pub mod mesh;
 pub mod qp;
+pub mod tensor;
+
+#[cfg(test)]
+mod random;

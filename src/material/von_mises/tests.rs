@@ -1,0 +1,213 @@
+use super::*;
+use crate::material::samples::STEEL;
+use crate::random::Random;
+use crate::tensor::{apply, contract, von_mises};
+
+/// Strains of the paper's steel that are elastic, just plastic and deeply plastic, each from a virgin and a worn state.
+fn states() -> impl Iterator<Item = (Material, Voigt, History)> {
+    let mut random = Random::new(7);
+    (0..200).map(move |k| {
+        let material = Material { hardening: [0.0, 10.0, 10000.0, 1e6][k % 4], ..STEEL };
+        let mut history = History::default();
+        if k % 3 > 0 {
+            history = material.commit(&random.vector(0.01), &history);
+        }
+        let size = [1e-3, 4e-3, 2e-2][k % 5 % 3];
+        let start = history.plastic_strain;
+        let step: Voigt = random.vector(size);
+        (material, std::array::from_fn(|i| start[i] + step[i]), history)
+    })
+}
+
+fn moved(strain: &Voigt, direction: &Voigt, by: f64) -> Voigt {
+    std::array::from_fn(|i| strain[i] + by * direction[i])
+}
+
+/// x with matrix x = right, by Gaussian elimination without pivoting (the matrices are positive definite).
+fn solve(mut matrix: Tangent, mut right: Voigt) -> Voigt {
+    for k in 0..6 {
+        let pivot = matrix[k];
+        for i in 0..6 {
+            if i != k {
+                let factor = matrix[i][k] / pivot[k];
+                for (entry, p) in matrix[i].iter_mut().zip(pivot) {
+                    *entry -= factor * p;
+                }
+                right[i] -= factor * right[k];
+            }
+        }
+    }
+    std::array::from_fn(|i| right[i] / matrix[i][i])
+}
+
+/// The strain under a stress given in all components, except that the ones in `held` are given as strains.
+fn strain_under(material: &Material, given: Voigt, held: &[usize]) -> (Voigt, Response) {
+    let virgin = History::default();
+    let mut strain = [0.0; 6];
+    held.iter().for_each(|&i| strain[i] = given[i]);
+    for _ in 0..50 {
+        let stress = material.respond(&strain, &virgin).stress;
+        let mut tangent = material.tangent(&strain, &virgin);
+        let mut rest: Voigt = std::array::from_fn(|i| given[i] - stress[i]);
+        for &i in held {
+            tangent[i] = [0.0; 6];
+            tangent[i][i] = 1.0;
+            rest[i] = 0.0;
+        }
+        if rest.iter().all(|r| r.abs() < 1e-10) {
+            return (strain, material.respond(&strain, &virgin));
+        }
+        strain = moved(&strain, &solve(tangent, rest), 1.0);
+    }
+    panic!("the test's Newton method did not converge");
+}
+
+fn close(value: f64, expected: f64, digits: f64) {
+    assert!((value - expected).abs() <= digits * expected.abs(), "{value} is not {expected}");
+}
+
+#[test]
+fn uniaxial_tension() {
+    for (stress, axial, lateral) in
+        [(500.0, 7.380952380952e-3, -3.190476190476e-3), (600.0, 1.785714285714e-2, -8.328571428571e-3)]
+    {
+        let (strain, response) = strain_under(&STEEL, [stress, 0.0, 0.0, 0.0, 0.0, 0.0], &[]);
+        close(strain[0], axial, 1e-12);
+        close(strain[1], lateral, 1e-12);
+        close(strain[2], lateral, 1e-12);
+        close(response.kappa, (stress - 450.0) / 10000.0, 1e-12);
+        assert!(response.plastic);
+    }
+}
+
+#[test]
+fn equibiaxial_tension_and_pure_shear() {
+    let (strain, _) = strain_under(&STEEL, [500.0, 500.0, 0.0, 0.0, 0.0, 0.0], &[]);
+    close(strain[0], 4.190476190476e-3, 1e-12);
+    close(strain[1], 4.190476190476e-3, 1e-12);
+    close(strain[2], -6.380952380952e-3, 1e-12);
+    for shear in 3..6 {
+        let mut stress = [0.0; 6];
+        stress[shear] = 300.0;
+        close(strain_under(&STEEL, stress, &[]).0[shear], 1.574342794511e-2, 1e-12);
+    }
+}
+
+#[test]
+fn plane_strain_compression() {
+    for (pressed, sy, sz, ex, kappa) in [
+        (-0.003, -521.0219850755, -180.9355848486, 1.5960848602e-3, 8.181380250e-4),
+        (-0.01, -615.0331028446, -277.3841778765, 8.2151654386e-3, 8.348593996e-3),
+    ] {
+        let (strain, response) = strain_under(&STEEL, [0.0, pressed, 0.0, 0.0, 0.0, 0.0], &[1, 2]);
+        close(response.stress[1], sy, 1e-11);
+        close(response.stress[2], sz, 1e-11);
+        close(strain[0], ex, 1e-10);
+        close(response.kappa, kappa, 1e-9);
+    }
+}
+
+#[test]
+fn a_plastic_stress_is_on_the_yield_surface_and_an_elastic_one_inside() {
+    let mut plastic = 0;
+    for (material, strain, history) in states() {
+        let response = material.respond(&strain, &history);
+        let limit = 450.0 + material.hardening * response.kappa;
+        if response.plastic {
+            plastic += 1;
+            close(von_mises(&response.stress), limit, 1e-12);
+            assert!(response.kappa > history.kappa);
+        } else {
+            assert!(von_mises(&response.stress) <= limit);
+            assert_eq!(response.kappa, history.kappa);
+        }
+    }
+    assert!((50..190).contains(&plastic), "both branches are tested: {plastic} of 200 are plastic");
+}
+
+#[test]
+fn stress_is_the_derivative_of_the_potential_and_the_tangent_that_of_the_stress() {
+    let mut random = Random::new(1);
+    let h = 1e-8;
+    for (material, strain, history) in states() {
+        let tangent = material.tangent(&strain, &history);
+        let direction = random.vector(1.0);
+        let at = |by| material.respond(&moved(&strain, &direction, by), &history);
+        let (back, here, ahead) = (at(-h), at(0.0), at(h));
+        close((ahead.energy - back.energy) / (2.0 * h), contract(&here.stress, &direction), 2e-6);
+        if back.plastic == ahead.plastic {
+            let along = apply(&tangent, &direction);
+            let scale = along.iter().fold(1e3f64, |m, s| m.max(s.abs()));
+            for (i, s) in along.iter().enumerate() {
+                let difference = (ahead.stress[i] - back.stress[i]) / (2.0 * h);
+                assert!((difference - s).abs() < 1e-6 * scale, "{difference} {s}");
+            }
+        }
+    }
+}
+
+#[test]
+fn tangent_is_symmetric_and_between_its_bounds() {
+    let mut random = Random::new(2);
+    for (material, strain, history) in states() {
+        let (c, tangent) = (material.elastic_tangent(), material.tangent(&strain, &history));
+        for i in 0..6 {
+            for j in 0..6 {
+                assert_eq!(tangent[i][j], tangent[j][i]);
+            }
+        }
+        let least = material.hardening / (3.0 * material.shear_modulus() + material.hardening);
+        // Only the part transversal to the flow is reduced further, to the ratio of yield stress and trial stress.
+        let shrink = Trial::new(&material, &strain, &history).shrink;
+        for _ in 0..20 {
+            let direction = random.vector(1.0);
+            let elastic = contract(&apply(&c, &direction), &direction);
+            let form = contract(&apply(&tangent, &direction), &direction);
+            assert!(form <= elastic * (1.0 + 1e-14));
+            assert!(form >= elastic * least.min(shrink) - 1e-12 * elastic && form > 0.0);
+        }
+        if !material.respond(&strain, &history).plastic {
+            assert_eq!(tangent, c);
+        }
+    }
+}
+
+#[test]
+fn potential_is_convex() {
+    let mut random = Random::new(3);
+    for (material, strain, history) in states() {
+        let direction = random.vector(0.01);
+        let at = |by| material.respond(&moved(&strain, &direction, by), &history).energy;
+        for t in [0.1, 0.5, 0.8] {
+            let chord = (1.0 - t) * at(0.0) + t * at(1.0);
+            assert!(at(t) <= chord * (1.0 + 1e-14));
+        }
+    }
+}
+
+/// The constant of Psi: after a commit it forgets exactly what the step dissipated and stored by hardening.
+#[test]
+fn potential_of_a_step_is_the_elastic_one_after_it_and_the_plastic_work_of_it() {
+    for (material, strain, history) in states() {
+        let after = material.commit(&strain, &history);
+        let (step, next) = (material.respond(&strain, &history), material.respond(&strain, &after));
+        let (old, new) = (history.kappa, after.kappa);
+        let work = 450.0 * (new - old) + 0.5 * material.hardening * (new * new - old * old);
+        close(step.energy, next.energy + work, 1e-12);
+        let rounding = 1e-12 * von_mises(&step.stress);
+        assert!(step.stress.iter().zip(next.stress).all(|(a, b)| (a - b).abs() < rounding));
+        assert!(trace(&after.plastic_strain).abs() < 1e-16);
+    }
+}
+
+#[test]
+fn without_a_yield_stress_nothing_yields() {
+    let elastic = Material::elastic(210000.0, 0.29);
+    let strain = [0.1, 0.2, -0.3, 0.4, 0.5, 0.6];
+    let response = elastic.respond(&strain, &History::default());
+    assert!(!response.plastic);
+    let expected = apply(&elastic.elastic_tangent(), &strain);
+    response.stress.iter().zip(expected).for_each(|(s, e)| close(*s, e, 1e-14));
+    close(response.energy, 0.5 * contract(&expected, &strain), 1e-14);
+    assert_eq!(elastic.commit(&strain, &History::default()), History::default());
+}
