@@ -13,3 +13,8 @@ pub mod tensor;
 
 #[cfg(test)]
 mod random;
+pub mod assembly;
+pub mod constraint;
+pub mod contact;
+pub mod decomposition;
+pub mod feti;

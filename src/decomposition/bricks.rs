@@ -21,7 +21,14 @@ pub(crate) fn own_elements(bodies: &[BodyMesh], cells: [usize; 3], comm: &dyn Co
             let number = subdomain - before;
             let at = [number % nx, number / nx % ny, number / (nx * ny)];
             let low: [usize; 3] = std::array::from_fn(|a| at[a] * cells[a]);
-            (body, bodies[body].brick.elements_of_box(low, cells).collect())
+            let mut elements = Vec::new();
+            for k in low[2]..low[2] + cells[2] {
+                for j in low[1]..low[1] + cells[1] {
+                    let row = bodies[body].brick.cell([low[0], j, k]);
+                    elements.extend(6 * row..6 * (row + cells[0] as u64));
+                }
+            }
+            (body, elements)
         })
         .collect();
     (shares, lists)

@@ -58,7 +58,7 @@ fn spread(parts: usize, sizes: &[u64]) -> Vec<usize> {
 fn partition(body: &BodyMesh, wanted: usize) -> (Vec<i32>, usize) {
     let elements = body.brick.element_count();
     let mut nodes = Vec::with_capacity(4 * elements as usize);
-    nodes.extend((0..elements).flat_map(|e| body.brick.element(e)).map(|node| node as i32));
+    nodes.extend((0..elements).flat_map(|e| body.element(e)).map(|node| node as i32));
     let begins: Vec<i32> = (0..=elements as i32).map(|e| 4 * e).collect();
     let dual = metis::mesh_to_dual(&begins, &nodes, 3).expect("a brick's mesh has a dual graph");
     let (begin, neighbours) = (dual.xadj(), dual.adjncy());

@@ -14,7 +14,8 @@ pub use interface::InterfaceNode;
 pub use subdomain::{Facet, Subdomain};
 
 use crate::comm::{Comm, Shares};
-use crate::mesh::brick::{Brick, Face};
+use crate::mesh::brick::Brick;
+use crate::mesh::face::Face;
 
 /// A surface that a support, load or contact names: a face of a brick body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -34,6 +35,13 @@ pub struct BodyMesh {
     pub first_node: u64,
     /// Number of elements of all bodies before this one.
     pub first_element: u64,
+}
+
+impl BodyMesh {
+    /// Nodes of an element, both numbered within the body.
+    pub fn element(&self, element: u64) -> [u64; 4] {
+        self.brick.tets(self.brick.cell_position(element / 6))[(element % 6) as usize]
+    }
 }
 
 /// How to cut the bodies.

@@ -1,7 +1,7 @@
 //! One subdomain's mesh in local numbering.
 
 use super::{BodyMesh, Surface};
-use crate::mesh::brick::Face;
+use crate::mesh::face::Face;
 
 /// A triangle on a named surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,12 +38,12 @@ impl Subdomain {
     /// From the numbers of its elements within the body (ascending).
     pub fn new(id: usize, body_index: usize, body: &BodyMesh, elements: &[u64], surfaces: &[Surface]) -> Self {
         let brick = &body.brick;
-        let tets: Vec<[u64; 4]> = elements.iter().map(|&e| brick.element(e)).collect();
+        let tets: Vec<[u64; 4]> = elements.iter().map(|&e| body.element(e)).collect();
         let mut nodes: Vec<u64> = tets.iter().flatten().copied().collect();
         nodes.sort_unstable();
         nodes.dedup();
         let local = |node: u64| nodes.binary_search(&node).expect("every corner is listed") as u32;
-        let points = nodes.iter().map(|&node| brick.point(node)).collect();
+        let points = nodes.iter().map(|&node| brick.coordinates(brick.node_position(node))).collect();
         let elements: Vec<[u32; 4]> = tets.iter().map(|tet| tet.map(local)).collect();
 
         let mut outer = outer_faces(&elements);
@@ -54,7 +54,7 @@ impl Subdomain {
         let facets = outer
             .into_iter()
             .filter_map(|triangle| {
-                let on = |face: Face| triangle.iter().all(|&n| brick.is_on_face(nodes[n as usize], face));
+                let on = |face: Face| triangle.iter().all(|&n| brick.is_on(face, brick.node_position(nodes[n as usize])));
                 let surface = surfaces.iter().position(|s| s.body == body_index && on(s.face))?;
                 Some(Facet { surface, nodes: triangle })
             })

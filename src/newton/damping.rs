@@ -1,0 +1,81 @@
+//! Step length along the Newton direction by the energy `J`.
+//!
+//! The full step is taken where it lowers `J` enough. Otherwise the slope of the convex function `J(u + t du)` is
+//! brought near zero by regula falsi (Illinois variant), which the convexity makes safe.
+
+use super::problem::{State, TornProblem};
+use crate::feti::Torn;
+use crate::monitor::timing::Timer;
+
+/// Share of the first-order decrease that is asked for (Armijo; Nocedal and Wright 2006, chapter 3).
+const SUFFICIENT: f64 = 1e-4;
+/// The slope is near zero when it is below this share of its first value.
+const FLAT: f64 = 0.1;
+/// Evaluations of `J` before the direction is given up.
+const TRIALS: usize = 30;
+
+/// The accepted step.
+pub struct Damped {
+    /// The new displacement, admissible.
+    pub u: Torn,
+    /// The problem there.
+    pub state: State,
+    /// Step length, 1 for the full step.
+    pub length: f64,
+}
+
+/// Searches from `u` along `du`. `None` if no length lowers the energy. Where `u` is not `admissible` the energies
+/// cannot be compared and the full step is taken.
+pub fn search(
+    problem: &TornProblem,
+    u: &Torn,
+    state: &State,
+    du: &Torn,
+    admissible: bool,
+    timer: &Timer,
+) -> Option<Damped> {
+    let trial = |length: f64| {
+        timer.time("internal forces", || {
+            let mut v = u.clone();
+            for (v, d) in v.iter_mut().zip(du) {
+                v.iter_mut().zip(d).for_each(|(v, d)| *v += length * d);
+            }
+            problem.make_admissible(&mut v);
+            let state = problem.evaluate(&v);
+            Damped { u: v, state, length }
+        })
+    };
+    let full = trial(1.0);
+    if !admissible {
+        return Some(full);
+    }
+    let first_slope = problem.slope(state, du);
+    // Below this, energies differ by round-off only.
+    let noise = 1e-14 * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs());
+    let lowers = |t: &Damped| t.state.energy <= state.energy + SUFFICIENT * t.length * first_slope.min(0.0) + noise;
+    if lowers(&full) {
+        return Some(full);
+    }
+    let mut low = (0.0, first_slope);
+    let mut high = (1.0, problem.slope(&full.state, du));
+    for _ in 0..TRIALS {
+        let inside = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
+        let length = if inside > low.0 && inside < high.0 { inside } else { 0.5 * (low.0 + high.0) };
+        let next = trial(length);
+        let slope = problem.slope(&next.state, du);
+        if lowers(&next) && slope.abs() <= FLAT * first_slope.abs() {
+            return Some(next);
+        }
+        if slope.is_nan() {
+            return None;
+        }
+        if slope < 0.0 {
+            low = (length, slope);
+            high.1 *= 0.5;
+        } else {
+            high = (length, slope);
+            low.1 *= 0.5;
+        }
+    }
+    None
+}

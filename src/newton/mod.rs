@@ -1,0 +1,165 @@
+//! Semismooth Newton for `min J(v) = Psi(v) - f'v` over the admissible displacements (paper, section 3).
+//!
+//! `J` is convex and every iterate is made feasible, so the step of the quadratic model is a descent direction and the
+//! method, damped by `J`, converges from anywhere. [`step`] is the only place where FETI and the QP solvers meet.
+
+pub mod damping;
+pub mod dual;
+pub mod problem;
+pub mod recover;
+pub mod residuals;
+pub mod step;
+
+pub use problem::TornProblem;
+pub use residuals::Residuals;
+pub use step::{StepSettings, StepSolver};
+
+use crate::feti::Torn;
+use crate::monitor::events::{Event, NewtonStep};
+use crate::monitor::Monitor;
+use crate::qp;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Bound on `|u+ - u|_e / (|u+|_e + |u|_e)` (paper, section 5).
+    pub tolerance: f64,
+    /// Bound on every one of the true residuals.
+    pub residual: f64,
+    /// Steps at most.
+    pub limit: usize,
+}
+
+/// How the iteration ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// Both criteria are met.
+    Converged,
+    /// The allowed steps are used up.
+    LimitReached,
+    /// No step length along the Newton direction lowers the energy: round-off, or a quadratic program solved too loosely.
+    Stalled,
+    /// A quantity is NaN or infinite.
+    NotFinite,
+    /// The quadratic program of a step could not be solved.
+    Inner(qp::Outcome),
+    /// A tangent stiffness is singular beyond its rigid motions.
+    Singular(String),
+}
+
+impl Outcome {
+    /// What to tell the user, `None` if all is well.
+    pub fn message(&self) -> Option<String> {
+        Some(match self {
+            Self::Converged => return None,
+            Self::LimitReached => "Newton's method reached solver.newton_limit without convergence".into(),
+            Self::Stalled => {
+                "Newton's method stalled: no step lowers the energy; tighten solver.qp_tolerance, or accept the residuals"
+                    .into()
+            }
+            Self::NotFinite => "the solution is not finite (NaN or infinite): check loads, sizes and moduli".into(),
+            Self::Inner(qp::Outcome::LimitReached) => {
+                "a quadratic program reached solver.qp_limit without convergence".into()
+            }
+            Self::Inner(outcome) => format!("a quadratic program could not be solved ({outcome:?})"),
+            Self::Singular(message) => message.clone(),
+        })
+    }
+}
+
+/// The solution and what it took.
+pub struct Solution {
+    /// Torn displacement; copies agree and the bodies do not overlap, to round-off.
+    pub u: Torn,
+    /// Multipliers of this rank's rows.
+    pub lambda: Vec<f64>,
+    /// How the iteration ended.
+    pub outcome: Outcome,
+    /// One record a step.
+    pub steps: Vec<NewtonStep>,
+    /// Residuals of the glued problem at `u`.
+    pub residuals: Residuals,
+    /// Sum over the steps.
+    pub statistics: qp::Statistics,
+    /// `J(u)`.
+    pub energy: f64,
+    /// `Psi(u)`.
+    pub internal_energy: f64,
+    /// `f'u`.
+    pub external_work: f64,
+    /// Elements that yield.
+    pub plastic_elements: usize,
+}
+
+/// Solves from rest. Collective.
+pub fn solve(problem: &TornProblem, solver: &mut StepSolver, settings: &Settings, monitor: &mut Monitor) -> Solution {
+    let mut u = problem.gather.zeros();
+    let mut state = problem.evaluate(&u);
+    let mut lambda = vec![0.0; problem.gather.rows()];
+    let mut residuals = problem.residuals(&u, &state, &lambda);
+    let mut statistics = qp::Statistics::default();
+    let mut steps = Vec::new();
+    let mut admissible = problem.is_admissible(&u);
+    let outcome = loop {
+        let watch = monitor.timer.seconds();
+        let step = match solver.solve(problem, &u, &state, &monitor.timer) {
+            Ok(step) => step,
+            Err(message) => break Outcome::Singular(message),
+        };
+        statistics += step.statistics;
+        if !matches!(step.outcome, qp::Outcome::Converged | qp::Outcome::LimitReached) {
+            break if step.outcome == qp::Outcome::NotFinite { Outcome::NotFinite } else { Outcome::Inner(step.outcome) };
+        }
+        // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
+        let Some(damped) = damping::search(problem, &u, &state, &step.du, admissible, &monitor.timer) else {
+            break if state.energy.is_finite() { Outcome::Stalled } else { Outcome::NotFinite };
+        };
+        let criterion = problem.relative_change(&u, &damped.u);
+        u = damped.u;
+        state = damped.state;
+        lambda = step.lambda;
+        admissible = true;
+        residuals = monitor.timer.time("residuals", || problem.residuals(&u, &state, &lambda));
+        let record = NewtonStep {
+            step: steps.len() + 1,
+            criterion,
+            residual: residuals.largest(),
+            damping: damped.length,
+            energy: state.energy,
+            plastic_elements: state.plastic,
+            active_contacts: problem.active_contacts(&lambda),
+            qp_outer: step.statistics.outer,
+            qp_iterations: step.statistics.cg + step.statistics.expansions + step.statistics.proportionings,
+            hessian_multiplications: step.applications,
+            factorisations: step.factorisations,
+            seconds: monitor.timer.seconds() - watch,
+        };
+        monitor.event(&Event::NewtonStep(record.clone()));
+        steps.push(record);
+        if !(criterion.is_finite() && state.energy.is_finite()) {
+            break Outcome::NotFinite;
+        }
+        let close = criterion < settings.tolerance || problem.is_linear();
+        if close && residuals.largest() <= settings.residual {
+            break Outcome::Converged;
+        }
+        if step.outcome == qp::Outcome::LimitReached {
+            break Outcome::Inner(step.outcome);
+        }
+        if steps.len() >= settings.limit {
+            break Outcome::LimitReached;
+        }
+    };
+    Solution {
+        u,
+        lambda,
+        outcome,
+        steps,
+        residuals,
+        statistics,
+        energy: state.energy,
+        internal_energy: state.internal_energy,
+        external_work: state.external_work,
+        plastic_elements: state.plastic,
+    }
+}

@@ -1,0 +1,139 @@
+//! The torn nonlinear problem: `J`, `F(u)`, and the admissible set.
+
+use crate::assembly::internal;
+use crate::constraint::{Constraints, Kind};
+use crate::decomposition::Subdomain;
+use crate::feti::Torn;
+use crate::feti::gather::Gather;
+use crate::feti::space::RowSpace;
+use crate::material::Material;
+
+/// What one rank holds of the problem.
+pub struct TornProblem<'a> {
+    /// Own subdomains.
+    pub subdomains: &'a [Subdomain],
+    /// Material of each own subdomain.
+    pub materials: Vec<Material>,
+    /// `f`: nodal forces.
+    pub loads: Torn,
+    /// The rows of B.
+    pub constraints: &'a Constraints,
+    /// B.
+    pub gather: &'a Gather<'a>,
+    /// Inner products and sums.
+    pub space: &'a RowSpace<'a>,
+    /// Whether any material of the scene yields.
+    pub yields: bool,
+}
+
+/// The problem at one displacement.
+pub struct State {
+    /// `F(u)`.
+    pub forces: Torn,
+    /// `J(u)`.
+    pub energy: f64,
+    /// `Psi(u)`.
+    pub internal_energy: f64,
+    /// `f'u`.
+    pub external_work: f64,
+    /// Elements that yield.
+    pub plastic: usize,
+}
+
+/// `x'y` of local vectors.
+pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+impl TornProblem<'_> {
+    /// Without plastic material, one step solves the problem.
+    pub fn is_linear(&self) -> bool {
+        !self.yields
+    }
+
+    /// Internal forces and energies at `u`. One collective.
+    pub fn evaluate(&self, u: &Torn) -> State {
+        let mut forces = self.gather.zeros();
+        let mut partial = Vec::with_capacity(3 * u.len());
+        for (own, subdomain) in self.subdomains.iter().enumerate() {
+            let found = internal::add_forces(subdomain, &self.materials[own], &u[own], &mut forces[own]);
+            partial.extend([found.energy, dot(&self.loads[own], &u[own]), found.plastic as f64]);
+        }
+        let sum = self.space.sum(&partial, 3);
+        State {
+            forces,
+            energy: sum[0] - sum[1],
+            internal_energy: sum[0],
+            external_work: sum[1],
+            plastic: sum[2] as usize,
+        }
+    }
+
+    /// `(F(u) - f)'v`, the slope of `J` along `v`. One collective.
+    pub fn slope(&self, state: &State, v: &Torn) -> f64 {
+        let partial: Vec<f64> =
+            (0..v.len()).map(|own| dot(&state.forces[own], &v[own]) - dot(&self.loads[own], &v[own])).collect();
+        self.space.sum(&partial, 1)[0]
+    }
+
+    /// The paper's stopping criterion `|v - u|_e / (|v|_e + |u|_e)`, zero if nothing moves at all.
+    pub fn relative_change(&self, u: &Torn, v: &Torn) -> f64 {
+        let mut partial = Vec::with_capacity(3 * u.len());
+        for (own, subdomain) in self.subdomains.iter().enumerate() {
+            let difference: Vec<f64> = v[own].iter().zip(&u[own]).map(|(v, u)| v - u).collect();
+            partial.extend(internal::elastic_squares(subdomain, &self.materials[own], [&difference, &u[own], &v[own]]));
+        }
+        let norms: Vec<f64> = self.space.sum(&partial, 3).into_iter().map(f64::sqrt).collect();
+        if norms[0] == 0.0 { 0.0 } else { norms[0] / (norms[1] + norms[2]) }
+    }
+
+    /// `c - B u`: what is left until each constraint holds. One neighbour exchange.
+    pub fn slack(&self, u: &Torn) -> Vec<f64> {
+        let mut slack = vec![0.0; self.gather.rows()];
+        self.gather.apply(u, &mut slack);
+        for (s, row) in slack.iter_mut().zip(&self.constraints.rows) {
+            *s = row.rhs - *s;
+        }
+        slack
+    }
+
+    /// The part of the slack that violates its constraint.
+    fn violation(&self, u: &Torn) -> Vec<f64> {
+        let mut violation = self.slack(u);
+        for (v, row) in violation.iter_mut().zip(&self.constraints.rows) {
+            if row.is_inequality() {
+                *v = v.min(0.0);
+            }
+        }
+        violation
+    }
+
+    /// The nearest admissible displacement: rows are orthonormal, so one correction by `B'` is the projection.
+    pub fn make_admissible(&self, u: &mut Torn) {
+        let violation = self.violation(u);
+        self.gather.add_transpose(1.0, &violation, u);
+    }
+
+    /// Whether a displacement satisfies all constraints to round-off.
+    pub fn is_admissible(&self, u: &Torn) -> bool {
+        let violation = self.violation(u);
+        let rhs: Vec<f64> = self.constraints.rows.iter().map(|row| row.rhs).collect();
+        let squares = self.space.dots(&[(&violation, &violation), (&rhs, &rhs)]);
+        squares[0] <= f64::EPSILON * squares[1]
+    }
+
+    /// Number of contact rows with a positive multiplier. One collective.
+    pub fn active_contacts(&self, lambda: &[f64]) -> usize {
+        let active = |row: u32| {
+            let kind = self.constraints.rows[row as usize].kind;
+            matches!(kind, Kind::Contact { .. }) && lambda[row as usize] > 0.0
+        };
+        let partial: Vec<f64> = self
+            .space
+            .owned()
+            .iter()
+            .map(|rows| rows.iter().filter(|&&row| active(row)).count() as f64)
+            .collect();
+        self.space.sum(&partial, 1)[0] as usize
+    }
+}

@@ -1,0 +1,144 @@
+//! Residuals of the glued, undecomposed problem, computed from the displacement and the contact forces alone.
+//!
+//! With `v = f - F(u) - B_I'lambda_I` and the copies of each node added up, equilibrium asks that what is left at the
+//! unsupported components is zero. Nothing of the dual solver's recurrences is used.
+
+use super::problem::{State, TornProblem};
+use crate::constraint::Kind;
+use crate::feti::Torn;
+
+/// Relative residuals; all are zero for the exact solution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residuals {
+    /// Euclidean norm of the unbalanced nodal forces over that of the applied or internal nodal forces.
+    pub equilibrium: f64,
+    /// Largest distance of a copy from its node's mean, or of a supported node from its prescribed value, over the
+    /// largest displacement.
+    pub gluing: f64,
+    /// Deepest penetration over the largest displacement.
+    pub gap: f64,
+    /// Largest product of contact force and gap over largest contact force times largest displacement.
+    pub complementarity: f64,
+}
+
+impl Residuals {
+    /// The largest of the four; NaN if any is.
+    pub fn largest(&self) -> f64 {
+        [self.equilibrium, self.gluing, self.gap, self.complementarity]
+            .into_iter()
+            .fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+    }
+}
+
+/// `a / b`, and zero where there is nothing to compare with and nothing wrong.
+fn relative(a: f64, b: f64) -> f64 {
+    if a == 0.0 { 0.0 } else { a / b }
+}
+
+impl TornProblem<'_> {
+    /// Residuals at a displacement with the contact part of the multipliers. Collective.
+    pub fn residuals(&self, u: &Torn, state: &State, lambda: &[f64]) -> Residuals {
+        let unbalanced = self.unbalanced(state, lambda);
+        let mut free = unbalanced.clone();
+        self.remove(&mut free, |kind| !matches!(kind, Kind::Contact { .. }));
+        let mut applied = self.loads.clone();
+        self.remove(&mut applied, |kind| kind == Kind::Gluing);
+        let mut internal = state.forces.clone();
+        self.remove(&mut internal, |kind| kind == Kind::Gluing);
+        let squares = self.glued_squares([&free, &applied, &internal]);
+
+        let slack = self.slack(u);
+        let mut worst = [0.0_f64; 5];
+        for ((row, &s), &force) in self.constraints.rows.iter().zip(&slack).zip(lambda) {
+            let (gap, force) = (s / row.scale, row.scale * force);
+            let found = if row.is_inequality() {
+                [0.0, (-gap).max(0.0), (gap * force).abs(), force.abs(), 0.0]
+            } else {
+                [s.abs(), 0.0, 0.0, 0.0, 0.0]
+            };
+            for (w, f) in worst.iter_mut().zip(found) {
+                *w = if f.is_nan() { f } else { w.max(f) };
+            }
+        }
+        worst[4] = largest_displacement(u);
+        let [glue, gap, product, force, size] = worst.map(|w| self.space.maximum(w));
+        Residuals {
+            equilibrium: relative(squares[0].sqrt(), squares[1].max(squares[2]).sqrt()),
+            gluing: relative(glue, size),
+            gap: relative(gap, size),
+            complementarity: relative(product, force * size),
+        }
+    }
+
+    /// `f - F(u) - B_I'lambda_I`, torn: after adding up copies, minus the reactions.
+    fn unbalanced(&self, state: &State, lambda: &[f64]) -> Torn {
+        let contact: Vec<f64> = self
+            .constraints
+            .rows
+            .iter()
+            .zip(lambda)
+            .map(|(row, &l)| if row.is_inequality() { l } else { 0.0 })
+            .collect();
+        let mut v = self.loads.clone();
+        for (v, f) in v.iter_mut().zip(&state.forces) {
+            v.iter_mut().zip(f).for_each(|(v, f)| *v -= f);
+        }
+        self.gather.add_transpose(-1.0, &contact, &mut v);
+        v
+    }
+
+    /// Force of each support on the bodies, `[support][component]`. Collective.
+    pub fn reactions(&self, state: &State, lambda: &[f64], supports: usize) -> Vec<[f64; 3]> {
+        let mut rows = vec![0.0; self.gather.rows()];
+        self.gather.apply(&self.unbalanced(state, lambda), &mut rows);
+        let mut partial = vec![0.0; 3 * supports * self.space.owned().len()];
+        for (sum, owned) in partial.chunks_exact_mut((3 * supports).max(1)).zip(self.space.owned()) {
+            for &row in owned {
+                if let Kind::Support { support, axis } = self.constraints.rows[row as usize].kind {
+                    sum[3 * support + axis] -= rows[row as usize] / self.constraints.rows[row as usize].scale;
+                }
+            }
+        }
+        let sum = self.space.sum(&partial, 3 * supports);
+        sum.chunks_exact(3).map(|r| [r[0], r[1], r[2]]).collect()
+    }
+
+    /// Removes from a torn vector its part along the rows of some kinds: those along gluing rows leave the mean over
+    /// the copies, those along support rows nothing.
+    fn remove(&self, v: &mut Torn, kinds: impl Fn(Kind) -> bool) {
+        let mut rows = vec![0.0; self.gather.rows()];
+        self.gather.apply(v, &mut rows);
+        for (value, row) in rows.iter_mut().zip(&self.constraints.rows) {
+            if !kinds(row.kind) {
+                *value = 0.0;
+            }
+        }
+        self.gather.add_transpose(-1.0, &rows, v);
+    }
+
+    /// Squared norms over the nodes of the undecomposed mesh, of torn vectors whose copies all hold the mean: a node of
+    /// `m` copies carries `m` times the mean, and is met `m` times.
+    fn glued_squares<const N: usize>(&self, vectors: [&Torn; N]) -> Vec<f64> {
+        let mut partial = Vec::with_capacity(N * self.subdomains.len());
+        for (own, copies) in self.constraints.copies.iter().enumerate() {
+            for vector in vectors {
+                let mut square = vector[own].iter().map(|x| x * x).sum::<f64>();
+                for &(node, count) in copies {
+                    let at = 3 * node as usize;
+                    let local: f64 = vector[own][at..at + 3].iter().map(|x| x * x).sum();
+                    square += (f64::from(count) - 1.0) * local;
+                }
+                partial.push(square);
+            }
+        }
+        self.space.sum(&partial, N)
+    }
+}
+
+/// Largest Euclidean norm of a nodal displacement on this rank; NaN if any is.
+pub fn largest_displacement(u: &Torn) -> f64 {
+    u.iter()
+        .flat_map(|local| local.chunks_exact(3))
+        .map(|u| (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).sqrt())
+        .fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+}
