@@ -1,20 +1,23 @@
 //! fetiplast: contact of elasto-plastic bodies in 3D by Total-FETI domain decomposition on MPI.
 //!
-//! Data flows one way: [`scene`] -> [`mesh`] -> [`decomposition`] -> [`constraint`] -> [`assembly`] ->
+//! Data flows one way: [`scene`] -> [`mesh`] -> [`decomposition`] -> [`contact`] -> [`constraint`] -> [`assembly`] ->
 //! [`feti`] + [`qp`] -> [`newton`] -> [`results`]; [`study`] is the only file that sees every stage.
 //! The method is the one of Cermak and Sysala, "Total-FETI method for solving contact elasto-plastic problems".
 
+pub mod assembly;
 pub mod comm;
+pub mod constraint;
+pub mod contact;
+pub mod decomposition;
 pub mod element;
+pub mod feti;
 pub mod material;
 pub mod mesh;
+pub mod monitor;
+pub mod newton;
 pub mod qp;
+pub mod scene;
 pub mod tensor;
 
 #[cfg(test)]
 mod random;
-pub mod assembly;
-pub mod constraint;
-pub mod contact;
-pub mod decomposition;
-pub mod feti;

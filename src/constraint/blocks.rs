@@ -41,6 +41,7 @@ impl Constraints {
             slot_subdomain: Vec::new(),
             entries: vec![Vec::new(); decomposition.subdomains.len()],
             copies: local_copies(decomposition),
+            has_inequalities: !pairs.is_empty(),
             idle_pairs: 0,
         };
         for key in keys {

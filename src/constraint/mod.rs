@@ -111,6 +111,8 @@ pub struct Constraints {
     pub entries: Vec<Vec<Entry>>,
     /// Own nodes with copies elsewhere or rows: for each own subdomain (local node, number of copies) where > 1.
     pub copies: Vec<Vec<(u32, u32)>>,
+    /// Whether any rank has contact rows.
+    pub has_inequalities: bool,
     /// Number of contact pairs without a row, because supports fix both nodes along the normal.
     pub idle_pairs: usize,
 }

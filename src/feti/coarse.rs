@@ -3,11 +3,13 @@
 //! `G x` is local to each subdomain; one all-gather brings it to every rank, each of which holds the sparse Cholesky
 //! factor of `G G'` and solves redundantly: ranks agree to the last bit, and `G'a` needs no further exchange.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::linalg::cholesky::llt::factor::{self as numeric, LltRegularization};
 use faer::prelude::MatMut;
+use faer::sparse::linalg::LltError;
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Par, Side, Spec};
@@ -36,14 +38,15 @@ pub struct Floating {
 /// `G` and the factor of `G G'`.
 pub struct Coarse<'a> {
     comm: &'a dyn Comm,
-    counts: Vec<usize>,
+    shares: Shares,
     /// Rows of `G'`: for each slot of each row, the subdomain and its six modes' values.
     slot_begin: Vec<u32>,
     slot_subdomain: Vec<u32>,
     slot_modes: Vec<[f64; MODES]>,
     /// For each own subdomain, its (row, slot) in row order.
     own_slots: Vec<Vec<(u32, u32)>>,
-    factor: CoarseFactor,
+    /// Of all rows; present once the coarse problem is set up.
+    factor: Option<CoarseFactor>,
 }
 
 impl<'a> Coarse<'a> {
@@ -78,18 +81,53 @@ impl<'a> Coarse<'a> {
             },
         );
         let own_slots = gather_own_slots(constraints, gather, subdomains.len());
-        let first = shares.begin(comm.rank());
-        let blocks = own_blocks(constraints, &slot_modes, &own_slots, first);
-        let factor = CoarseFactor::new(&share_blocks(comm, &blocks), shares.total())?;
-        Ok(Self {
+        let mut coarse = Self {
             comm,
-            counts: shares.counts(MODES),
+            shares: shares.clone(),
             slot_begin: constraints.slot_begin.clone(),
             slot_subdomain: constraints.slot_subdomain.clone(),
             slot_modes,
             own_slots,
-            factor,
-        })
+            factor: None,
+        };
+        coarse.factor = Some(coarse.restricted(|_| true)?);
+        Ok(coarse)
+    }
+
+    /// The factor of `G G'` with only the kept rows of the constraints. Collective.
+    ///
+    /// # Errors
+    /// If these rows leave a rigid motion free: on every rank.
+    pub fn restricted(&self, kept: impl Fn(usize) -> bool) -> Result<CoarseFactor, Floating> {
+        CoarseFactor::new(&share_blocks(self.comm, &self.own_blocks(kept)), self.shares.total())
+    }
+
+    /// Block rows of `G G'` that belong to own subdomains, lower triangle. Complete: every row that a subdomain takes
+    /// part in is on its rank.
+    fn own_blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
+        let first = self.shares.begin(self.comm.rank());
+        let mut blocks = Blocks::new();
+        for (own, slots) in self.own_slots.iter().enumerate() {
+            for &(row, slot) in slots.iter().filter(|(row, _)| kept(*row as usize)) {
+                for other in self.slots(row as usize) {
+                    let column = self.slot_subdomain[other] as usize;
+                    if column > first + own {
+                        continue;
+                    }
+                    let block = blocks.entry((first + own, column)).or_insert([0.0; MODES * MODES]);
+                    for (i, a) in self.slot_modes[slot as usize].iter().enumerate() {
+                        for (j, b) in self.slot_modes[other].iter().enumerate() {
+                            block[MODES * i + j] += a * b;
+                        }
+                    }
+                }
+            }
+        }
+        blocks
+    }
+
+    fn slots(&self, row: usize) -> std::ops::Range<usize> {
+        self.slot_begin[row] as usize..self.slot_begin[row + 1] as usize
     }
 
     /// `G rows`, whole on every rank. One all-gather.
@@ -106,19 +144,19 @@ impl<'a> Coarse<'a> {
 
     /// Brings six numbers an own subdomain to every rank.
     pub fn share(&self, mine: &[f64]) -> Vec<f64> {
-        self.comm.all_gather(mine, &self.counts)
+        self.comm.all_gather(mine, &self.shares.counts(MODES))
     }
 
     /// `(G G')^-1 a`, in place. Local.
-    pub fn solve(&mut self, a: &mut [f64]) {
-        self.factor.solve(a);
+    pub fn solve(&self, a: &mut [f64]) {
+        self.factor.as_ref().expect("set up by new").solve(a);
     }
 
     /// `rows += factor G' a`. Local.
     pub fn add_transpose(&self, factor: f64, a: &[f64], rows: &mut [f64]) {
         for (row, x) in rows.iter_mut().enumerate() {
             let mut sum = 0.0;
-            for slot in self.slot_begin[row] as usize..self.slot_begin[row + 1] as usize {
+            for slot in self.slots(row) {
                 let at = MODES * self.slot_subdomain[slot] as usize;
                 sum += self.slot_modes[slot].iter().zip(&a[at..at + MODES]).map(|(g, a)| g * a).sum::<f64>();
             }
@@ -142,33 +180,6 @@ fn gather_own_slots(constraints: &Constraints, gather: &Gather, own: usize) -> V
 /// A 6x6 block of `G G'`, by `(row, column)` subdomain.
 type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;
 
-/// Block rows of `G G'` that belong to own subdomains, lower triangle. Complete: every row of a subdomain is here.
-fn own_blocks(
-    constraints: &Constraints,
-    slot_modes: &[[f64; MODES]],
-    own_slots: &[Vec<(u32, u32)>],
-    first: usize,
-) -> Blocks {
-    let mut blocks = Blocks::new();
-    for (own, slots) in own_slots.iter().enumerate() {
-        for &(row, slot) in slots {
-            for other in constraints.slots(row as usize) {
-                let column = constraints.slot_subdomain[other] as usize;
-                if column > first + own {
-                    continue;
-                }
-                let block = blocks.entry((first + own, column)).or_insert([0.0; MODES * MODES]);
-                for (i, a) in slot_modes[slot as usize].iter().enumerate() {
-                    for (j, b) in slot_modes[other].iter().enumerate() {
-                        block[MODES * i + j] += a * b;
-                    }
-                }
-            }
-        }
-    }
-    blocks
-}
-
 /// The blocks of all ranks, on every rank.
 fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
     let mut message = Vec::new();
@@ -182,11 +193,11 @@ fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
         .collect()
 }
 
-/// Sparse Cholesky factor of `G G'`.
-struct CoarseFactor {
+/// Sparse Cholesky factor of `G G'`, whole on every rank.
+pub struct CoarseFactor {
     symbolic: SymbolicCholesky<u32>,
     values: Vec<f64>,
-    scratch: MemBuffer,
+    scratch: RefCell<MemBuffer>,
 }
 
 impl CoarseFactor {
@@ -226,52 +237,42 @@ impl CoarseFactor {
             .map(|_| ());
         // Round-off can hide a free motion: a pivot far below the largest is one.
         let largest = values.iter().copied().fold(0.0, f64::max);
-        let weakest = probe(&symbolic, &factor, &mut scratch, outcome.is_ok(), n);
-        if outcome.is_err() || !(weakest.1 * largest < 1.0 / SINGULAR) {
-            return Err(Floating { subdomain: weakest.0 / MODES });
+        let result = Self { symbolic, values: factor, scratch: RefCell::new(scratch) };
+        match outcome {
+            Ok(()) => result.check_rank(largest).map(|()| result),
+            Err(LltError::Numeric(numeric::LltError::NonPositivePivot { index })) => {
+                let column = result.symbolic.perm().map_or(index, |p| p.arrays().0[index] as usize);
+                Err(Floating { subdomain: column / MODES })
+            }
+            Err(LltError::Generic(error)) => panic!("the coarse problem does not fit in memory: {error}"),
         }
-        Ok(Self { symbolic, values: factor, scratch })
     }
 
-    fn solve(&mut self, a: &mut [f64]) {
+    /// Inverse iteration from a fixed vector without a pattern: a free motion shows as a huge response.
+    fn check_rank(&self, largest: f64) -> Result<(), Floating> {
+        let n = self.symbolic.nrows();
+        let mut x: Vec<f64> = (0..n).map(|k| if (k * k + k / 3) % 7 < 3 { 1.0 } else { -1.0 }).collect();
+        self.solve(&mut x);
+        let worst = x.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        match worst {
+            Some((at, response)) if !(response.abs() * largest < (n as f64).sqrt() / SINGULAR) => {
+                Err(Floating { subdomain: at / MODES })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// `a = (G G')^-1 a`, six numbers a subdomain. Local.
+    pub fn solve(&self, a: &mut [f64]) {
         let n = a.len();
         LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
             MatMut::from_column_major_slice_mut(a, n, 1),
             Par::Seq,
-            MemStack::new(&mut self.scratch),
+            MemStack::new(&mut self.scratch.borrow_mut()),
         );
     }
 }
 
 /// A coarse problem conditioned worse than the inverse of this leaves a motion free.
 const SINGULAR: f64 = 1e-12;
-
-/// Largest entry of `(G G')^-1` times a vector of ones and alternating signs, and where it is: infinite where the
-/// factorisation failed.
-fn probe(
-    symbolic: &SymbolicCholesky<u32>,
-    factor: &[f64],
-    scratch: &mut MemBuffer,
-    factorised: bool,
-    n: usize,
-) -> (usize, f64) {
-    if !factorised {
-        return (0, f64::INFINITY);
-    }
-    // Signs without a pattern that a rigid motion could be orthogonal to.
-    let mut x: Vec<f64> = (0..n).map(|k| if (k * k + k / 3) % 7 < 3 { 1.0 } else { -1.0 }).collect();
-    LltRef::new(symbolic, factor).solve_in_place_with_conj(
-        Conj::No,
-        MatMut::from_column_major_slice_mut(&mut x, n, 1),
-        Par::Seq,
-        MemStack::new(scratch),
-    );
-    let mut worst = (0, 0.0);
-    for (k, value) in x.iter().enumerate() {
-        if !(value.abs() <= worst.1) {
-            worst = (k, value.abs());
-        }
-    }
-    (worst.0, worst.1 / (n as f64).sqrt())
-}

@@ -30,12 +30,14 @@ impl<'a> DualOperator<'a> {
         self.gather.apply(&self.torn, y);
     }
 
-    /// `torn = K^+ (torn - B' rows)`. Local.
-    pub fn solve(&mut self, rows: &[f64], torn: &mut Torn) {
+    /// `torn = K^+ (torn - B' x)` and `y = B torn`: costs and counts as one application of F.
+    pub fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64]) {
+        self.applications += 1;
         for (own, local) in torn.iter_mut().enumerate() {
-            self.gather.add_transpose_one(own, -1.0, rows, local);
+            self.gather.add_transpose_one(own, -1.0, x, local);
             self.factors.solve(own, local);
         }
+        self.gather.apply(torn, y);
     }
 
     /// Applications of F so far.

@@ -10,7 +10,7 @@ pub struct Projector<'a> {
 
 impl Projector<'_> {
     /// `rows = P rows`; returns `(G G')^-1 G rows`. One all-gather.
-    pub fn project(&mut self, rows: &mut [f64]) -> Vec<f64> {
+    pub fn project(&self, rows: &mut [f64]) -> Vec<f64> {
         let mut a = self.coarse.apply(rows);
         self.coarse.solve(&mut a);
         self.coarse.add_transpose(-1.0, &a, rows);
@@ -18,7 +18,7 @@ impl Projector<'_> {
     }
 
     /// The smallest `rows` with `G rows = e`: `G'(G G')^-1 e`. Local.
-    pub fn particular(&mut self, e: &[f64], rows: &mut [f64]) {
+    pub fn particular(&self, e: &[f64], rows: &mut [f64]) {
         let mut a = e.to_vec();
         self.coarse.solve(&mut a);
         rows.fill(0.0);

@@ -5,6 +5,7 @@ use crate::constraint::{Constraints, Kind};
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::gather::Gather;
+use crate::feti::kernel::RigidModes;
 use crate::feti::space::RowSpace;
 use crate::material::Material;
 
@@ -14,6 +15,8 @@ pub struct TornProblem<'a> {
     pub subdomains: &'a [Subdomain],
     /// Material of each own subdomain.
     pub materials: Vec<Material>,
+    /// Rigid modes of each own subdomain.
+    pub modes: &'a [RigidModes],
     /// `f`: nodal forces.
     pub loads: Torn,
     /// The rows of B.

@@ -4,10 +4,8 @@
 //! `a = (G G')^-1 G (c - B K^+ (f_k - B'lambda))` with `G` restricted to those rows; at the solution exactly.
 
 use super::problem::TornProblem;
-use crate::comm::Shares;
 use crate::feti::Torn;
 use crate::feti::coarse::{Coarse, Floating, MODES};
-use crate::feti::kernel::RigidModes;
 
 /// Adds `R a` to `torn = K^+ (f_k - B'lambda)`, given the rows `defect = c_k - B torn` and which of them must vanish.
 ///
@@ -16,19 +14,15 @@ use crate::feti::kernel::RigidModes;
 pub fn add_rigid_motion(
     problem: &TornProblem,
     coarse: &Coarse,
-    modes: &[RigidModes],
-    shares: &Shares,
-    first: usize,
     kept: &[bool],
     defect: &[f64],
     torn: &mut Torn,
 ) -> Result<(), Floating> {
     let masked: Vec<f64> = defect.iter().zip(kept).map(|(d, &k)| if k { *d } else { 0.0 }).collect();
     let mut a = coarse.apply(&masked);
-    coarse.restricted(kept, shares)?.solve(&mut a);
-    for (own, (subdomain, modes)) in problem.subdomains.iter().zip(modes).enumerate() {
-        let at = MODES * (first + own);
-        modes.add_motion(&subdomain.points, &a[at..at + MODES], &mut torn[own]);
+    coarse.restricted(|row| kept[row])?.solve(&mut a);
+    for ((subdomain, modes), local) in problem.subdomains.iter().zip(problem.modes).zip(torn) {
+        modes.add_motion(&subdomain.points, &a[MODES * subdomain.id..][..MODES], local);
     }
     Ok(())
 }

@@ -1,0 +1,199 @@
+//! Checks of a typed scene: values in range, names that exist, counts that fit, bodies that are held.
+//!
+//! The first fault ends the check. What needs geometry (whether contact surfaces face each other) or a mesh is checked
+//! by the rooms that have them.
+
+use std::fmt::Debug;
+
+use super::body::{Axis, Body, Brick};
+use super::decomposition::Decomposition;
+use super::error::Fault;
+use super::held;
+use super::material::Material;
+use super::solver::Solver;
+use super::surface::{Contact, Support, SurfaceName};
+use super::{Scene, surface::Load};
+
+type Checked = Result<(), Fault>;
+
+/// The first fault of a scene, in the order of its sections.
+pub(super) fn scene(scene: &Scene) -> Checked {
+    if scene.body.is_empty() {
+        return Err(whole("body", "a scene needs at least one body, in a section [body.NAME]"));
+    }
+    scene.material.iter().try_for_each(|(name, it)| material(&format!("material.{name}"), it))?;
+    scene.body.iter().try_for_each(|(name, it)| body(scene, &format!("body.{name}"), it))?;
+    scene.support.iter().try_for_each(|(name, it)| support(scene, &format!("support.{name}"), it))?;
+    scene.load.iter().try_for_each(|(name, it)| load(scene, &format!("load.{name}"), it))?;
+    scene.contact.iter().try_for_each(|(name, it)| contact(scene, &format!("contact.{name}"), it))?;
+    decomposition(scene)?;
+    solver(&scene.solver)?;
+    compatible_supports(scene)?;
+    scene.body.keys().try_for_each(|name| holding(scene, name))
+}
+
+/// Passes if `holds`; else the fault reads `key = value: rule`.
+fn require(holds: bool, key: &str, value: impl Debug, rule: impl Into<String>) -> Checked {
+    if holds {
+        Ok(())
+    } else {
+        Err(Fault { key: key.to_owned(), value: Some(format!("{value:?}")), rule: rule.into() })
+    }
+}
+
+fn whole(key: &str, rule: impl Into<String>) -> Fault {
+    Fault { key: key.to_owned(), value: None, rule: rule.into() }
+}
+
+fn all_finite(key: &str, values: [f64; 3]) -> Checked {
+    require(values.iter().all(|value| value.is_finite()), key, values, "must be finite numbers")
+}
+
+fn names<'a>(known: impl Iterator<Item = &'a String>) -> String {
+    known.map(String::as_str).collect::<Vec<_>>().join(", ")
+}
+
+fn material(key: &str, material: &Material) -> Checked {
+    let Material { young, poisson, yield_stress, hardening } = *material;
+    let positive = |value: f64| value.is_finite() && value > 0.0;
+    require(positive(young), &format!("{key}.young"), young, "must be positive and finite")?;
+    let rule = "must be above -1 and below 0.5, where the material would be incompressible";
+    require(poisson > -1.0 && poisson < 0.5, &format!("{key}.poisson"), poisson, rule)?;
+    if let Some(stress) = yield_stress {
+        let rule = "must be positive and finite; leave it out for an elastic material";
+        require(positive(stress), &format!("{key}.yield_stress"), stress, rule)?;
+    }
+    let rule = "must be finite and not negative (0 is perfect plasticity): softening has no unique solution";
+    require(hardening.is_finite() && hardening >= 0.0, &format!("{key}.hardening"), hardening, rule)
+}
+
+fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
+    let rule = || format!("no such material: known are {}", names(scene.material.keys()));
+    require(scene.material.contains_key(&body.material), &format!("{key}.material"), &body.material, rule())?;
+    let Brick { origin, size, cells } = body.brick;
+    all_finite(&format!("{key}.brick.origin"), origin)?;
+    let positive = size.iter().all(|edge| edge.is_finite() && *edge > 0.0);
+    require(positive, &format!("{key}.brick.size"), size, "edges must be positive and finite")?;
+    let key = format!("{key}.brick.cells");
+    require(!cells.contains(&0), &key, cells, "must be at least 1 along each edge")?;
+    // A cell costs some tens of numbers; room for a thousand keeps every later product within the integers.
+    let countable = cells.iter().try_fold(1000_usize, |product, &n| product.checked_mul(n)).is_some();
+    require(countable, &key, cells, "too many cells (level included) to be counted")
+}
+
+fn surface(scene: &Scene, key: &str, name: &SurfaceName) -> Checked {
+    let rule = || format!("no body `{}`: known are {}", name.body, names(scene.body.keys()));
+    require(scene.body.contains_key(&name.body), key, name.to_string(), rule())
+}
+
+fn support(scene: &Scene, key: &str, support: &Support) -> Checked {
+    surface(scene, &format!("{key}.surface"), &support.surface)?;
+    let fix: Vec<String> = support.fix.iter().map(Axis::to_string).collect();
+    let fix_key = format!("{key}.fix");
+    require(!fix.is_empty(), &fix_key, &fix, "name at least one of x, y, z, or remove the support")?;
+    let once = Axis::ALL.iter().all(|axis| support.fix.iter().filter(|fixed| *fixed == axis).count() <= 1);
+    require(once, &fix_key, &fix, "name each of x, y, z at most once")?;
+    let Some(values) = support.displacement else { return Ok(()) };
+    let key = format!("{key}.displacement");
+    all_finite(&key, values)?;
+    for axis in Axis::ALL {
+        let used = support.fix.contains(&axis) || values[axis.index()] == 0.0;
+        require(used, &key, values, format!("component {axis} is not fixed, so it must be 0: add {axis} to fix"))?;
+    }
+    Ok(())
+}
+
+fn load(scene: &Scene, key: &str, load: &Load) -> Checked {
+    surface(scene, &format!("{key}.surface"), &load.surface)?;
+    all_finite(&format!("{key}.traction"), load.traction)
+}
+
+fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
+    surface(scene, &format!("{key}.slave"), &contact.slave)?;
+    let Contact { slave, master } = contact;
+    let key = format!("{key}.master");
+    surface(scene, &key, master)?;
+    let rule = "slave and master must be on different bodies; a body does not touch itself";
+    require(slave.body != master.body, &key, master.to_string(), rule)
+}
+
+fn decomposition(scene: &Scene) -> Checked {
+    match scene.decomposition {
+        Decomposition::Bricks { cells } => {
+            let key = "decomposition.cells";
+            require(!cells.contains(&0), key, cells, "must be at least 1 along each axis")?;
+            for (name, body) in &scene.body {
+                for axis in Axis::ALL {
+                    let (of_body, part) = (body.brick.cells[axis.index()], cells[axis.index()]);
+                    let rule = || {
+                        format!(
+                            "{part} does not divide the {of_body} cells (level included) of body {name} along {axis}"
+                        )
+                    };
+                    require(of_body.is_multiple_of(part), key, cells, rule())?;
+                }
+            }
+            Ok(())
+        }
+        Decomposition::Metis { subdomains } => {
+            let key = "decomposition.subdomains";
+            let bodies = scene.body.len();
+            require(subdomains >= bodies, key, subdomains, format!("each of the {bodies} bodies needs at least one"))?;
+            let per_body = scene.body.values().map(|body| body.brick.cell_count() * body.element.per_cell());
+            let elements = per_body.fold(0_usize, usize::saturating_add);
+            require(subdomains <= elements, key, subdomains, format!("there are only {elements} elements to share out"))
+        }
+    }
+}
+
+fn solver(solver: &Solver) -> Checked {
+    let tolerances = [
+        ("solver.newton_tolerance", solver.newton_tolerance),
+        ("solver.residual_tolerance", solver.residual_tolerance),
+        ("solver.qp_tolerance", solver.qp_tolerance),
+    ];
+    for (key, value) in tolerances {
+        require(value > 0.0 && value < 1.0, key, value, "a relative tolerance must be above 0 and below 1")?;
+    }
+    for (key, value) in [("solver.newton_limit", solver.newton_limit), ("solver.qp_limit", solver.qp_limit)] {
+        require(value >= 1, key, value, "must be at least 1")?;
+    }
+    Ok(())
+}
+
+/// Faces of a brick that are not opposite share nodes, where two supports must not prescribe different values.
+fn compatible_supports(scene: &Scene) -> Checked {
+    for (index, (name, one)) in scene.support.iter().enumerate() {
+        for (other_name, other) in scene.support.iter().take(index) {
+            let (face, other_face) = (one.surface.face, other.surface.face);
+            let meet =
+                one.surface.body == other.surface.body && (face == other_face || face.axis() != other_face.axis());
+            for axis in Axis::ALL.into_iter().filter(|_| meet) {
+                let (Some(value), Some(other_value)) = (one.prescribed(axis), other.prescribed(axis)) else { continue };
+                if value != other_value {
+                    let rule = format!(
+                        "prescribes the displacement {value:?} along {axis}, but support.{other_name} prescribes \
+                         {other_value:?} on nodes that {} and {} share",
+                        one.surface, other.surface
+                    );
+                    return Err(whole(&format!("support.{name}"), rule));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A body must be held by its supports unless contact may do so.
+fn holding(scene: &Scene, body: &str) -> Checked {
+    let free = held::free_motions(scene, body);
+    let touches = scene.contact.values().any(|pair| pair.slave.body == body || pair.master.body == body);
+    if free.is_empty() || touches {
+        return Ok(());
+    }
+    let rule = format!(
+        "nothing holds this body against {}: add supports, or a contact pair that can hold it",
+        held::listed(&free)
+    );
+    Err(whole(&format!("body.{body}"), rule))
+}

@@ -1,0 +1,135 @@
+//! `--set dotted.path=value`: changes to the value tree between reading and typing.
+//!
+//! Paths are TOML keys; a number steps into an array (`load.top.traction.2=-75`). Values are TOML; what is not TOML but
+//! begins with a letter is a string, so that shells need no quotes (`solver.qp=active-set`). A path may name a key that
+//! is absent; whether such a key exists at all is decided when the tree is typed.
+
+use toml::{Table, Value};
+
+use super::{Scene, SceneError};
+
+/// Sections whose entries have names of the user's choice.
+const NAMED: [&str; 5] = ["material", "body", "support", "load", "contact"];
+
+struct Override {
+    path: Vec<String>,
+    value: Value,
+}
+
+/// The tree with all overrides applied in order.
+pub(super) fn apply(mut tree: Table, sets: &[String]) -> Result<Table, SceneError> {
+    let changes = sets.iter().map(|set| parse(set)).collect::<Result<Vec<_>, _>>()?;
+    give_way(&mut tree, &changes);
+    for (change, set) in changes.into_iter().zip(sets) {
+        insert(&mut tree, change).map_err(|problem| refused(set, problem))?;
+    }
+    Ok(tree)
+}
+
+/// The error for a tree that was fine before the overrides: names the override that breaks it alone, or else all.
+pub(super) fn blame(tree: &Table, sets: &[String], error: &toml::de::Error) -> SceneError {
+    let culprit = sets.iter().find(|set| {
+        let changed = apply(tree.clone(), std::slice::from_ref(set)).ok().map(Table::try_into::<Scene>);
+        matches!(changed, Some(Err(alone)) if alone.message() == error.message())
+    });
+    // Without a text, toml's own message ends in a line "in `section`", which is wanted here.
+    let problem = error.to_string().trim_end().replace('\n', ", ");
+    match culprit {
+        Some(set) => refused(set, new_entry(tree, set, &problem).unwrap_or(problem)),
+        None => refused(&sets.join(" --set "), problem),
+    }
+}
+
+/// Whether this override gives the key its value, as a whole or in part.
+pub(super) fn concerns(set: &str, key: &str) -> bool {
+    parse(set).is_ok_and(|Override { mut path, .. }| {
+        path.pop_if(|last| last.parse::<usize>().is_ok());
+        let path = path.join(".");
+        key.strip_prefix(&path).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    })
+}
+
+fn refused(set: &str, problem: String) -> SceneError {
+    SceneError::Override { set: set.to_owned(), problem }
+}
+
+fn parse(set: &str) -> Result<Override, SceneError> {
+    let (path, value) = set
+        .split_once('=')
+        .ok_or_else(|| refused(set, "write dotted.path=value, as in solver.qp=active-set".into()))?;
+    let path = parse_path(path).ok_or_else(|| refused(set, format!("`{path}` is not a dotted path")))?;
+    let value = parse_value(value.trim()).map_err(|problem| refused(set, problem))?;
+    Ok(Override { path, value })
+}
+
+fn parse_path(path: &str) -> Option<Vec<String>> {
+    let mut table: Table = toml::from_str(&format!("{path} = 0")).ok()?;
+    let mut parts = Vec::new();
+    loop {
+        let mut entries = std::mem::take(&mut table).into_iter();
+        let (part, inner) = entries.next().filter(|_| entries.next().is_none())?;
+        parts.push(part);
+        match inner {
+            Value::Table(inner) => table = inner,
+            _ => return Some(parts),
+        }
+    }
+}
+
+fn parse_value(value: &str) -> Result<Value, String> {
+    match toml::from_str::<Table>(&format!("value = {value}")) {
+        Ok(mut table) if table.len() == 1 => Ok(table.remove("value").expect("the key just written")),
+        _ if value.starts_with(char::is_alphabetic) => Ok(Value::String(value.to_owned())),
+        Ok(_) => Err("give one value".to_owned()),
+        Err(error) => Err(format!("`{value}` is not a TOML value: {}", error.message().replace('\n', ", "))),
+    }
+}
+
+/// Keys of the file that an override makes meaningless: `subdomains` alone selects metis whatever method the file has,
+/// and `method=bricks` alone drops the file's `subdomains`.
+fn give_way(tree: &mut Table, changes: &[Override]) {
+    let given = |key: &str| changes.iter().find(|change| change.path == ["decomposition", key]);
+    let stale = match (given("method"), given("subdomains")) {
+        (None, Some(_)) => "method",
+        (Some(method), None) if method.value.as_str() == Some("bricks") => "subdomains",
+        _ => return,
+    };
+    if let Some(Value::Table(section)) = tree.get_mut("decomposition") {
+        section.remove(stale);
+    }
+}
+
+fn insert(tree: &mut Table, change: Override) -> Result<(), String> {
+    let (first, rest) = change.path.split_first().expect("a path has a part");
+    let mut here = tree.entry(first).or_insert_with(|| Value::Table(Table::new()));
+    let mut above = first.clone();
+    for part in rest {
+        here = match here {
+            Value::Table(table) => table.entry(part).or_insert_with(|| Value::Table(Table::new())),
+            Value::Array(values) => {
+                let length = values.len();
+                let index = part.parse::<usize>().ok().filter(|index| *index < length);
+                let index = index.ok_or_else(|| {
+                    format!("`{above}` is an array of {length}, and `{part}` is no index into it (they start at 0)")
+                })?;
+                &mut values[index]
+            }
+            other => return Err(format!("`{above}` is a single {}, it has no `{part}`", other.type_str())),
+        };
+        above = format!("{above}.{part}");
+    }
+    *here = change.value;
+    Ok(())
+}
+
+/// The likely case of a misspelt name, which would otherwise be told as a key missing from a new entry.
+fn new_entry(tree: &Table, set: &str, problem: &str) -> Option<String> {
+    let path = parse(set).ok()?.path;
+    let [section, name, _, ..] = path.as_slice() else { return None };
+    let known = tree.get(section).and_then(Value::as_table);
+    if !NAMED.contains(&section.as_str()) || known.is_some_and(|known| known.contains_key(name)) {
+        return None;
+    }
+    let known = known.map(|known| known.keys().cloned().collect::<Vec<_>>().join(", ")).unwrap_or_default();
+    Some(format!("unknown key `{section}.{name}`: [{section}] has {known}; a new entry needs all its keys ({problem})"))
+}

@@ -1,0 +1,58 @@
+//! From text to a typed scene, keeping the place of whatever is wrong.
+
+use std::ops::Range;
+
+use toml::Table;
+use toml::de::{DeTable, DeValue};
+
+use super::error::{Place, SceneError};
+use super::{Scene, overrides};
+
+/// Reads the text and applies the overrides; nothing is checked but form and types.
+pub(super) fn scene(text: &str, origin: &str, sets: &[String]) -> Result<Scene, SceneError> {
+    let syntax = |error: toml::de::Error| SceneError::Syntax {
+        place: Place::Text { origin: origin.to_owned(), position: error.span().map(|span| line_column(text, span)) },
+        message: error.message().replace('\n', ", "),
+    };
+    // A value tree knows no places, so the text is also read directly: its own errors are reported with theirs.
+    let unchanged = toml::from_str::<Scene>(text);
+    if sets.is_empty() {
+        return unchanged.map_err(syntax);
+    }
+    let tree: Table = toml::from_str(text).map_err(syntax)?;
+    let changed = overrides::apply(tree.clone(), sets)?;
+    changed.try_into().map_err(|error| match unchanged {
+        Err(own) => syntax(own),
+        Ok(_) => overrides::blame(&tree, sets, &error),
+    })
+}
+
+/// Where a dotted key got its value: an override, or the nearest line of the text.
+pub(super) fn place(text: &str, origin: &str, sets: &[String], key: &str) -> Place {
+    match sets.iter().rev().find(|set| overrides::concerns(set, key)) {
+        Some(set) => Place::Override(set.clone()),
+        None => Place::Text { origin: origin.to_owned(), position: position(text, key) },
+    }
+}
+
+fn position(text: &str, key: &str) -> Option<(usize, usize)> {
+    let root = DeTable::parse(text).ok()?;
+    let mut table = root.get_ref();
+    let mut found = None;
+    for part in key.split('.') {
+        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == part) else { break };
+        found = Some(line_column(text, name.span()));
+        match value.get_ref() {
+            DeValue::Table(inner) => table = inner,
+            _ => break,
+        }
+    }
+    found
+}
+
+/// Line and column of the beginning of a span of bytes, from 1; columns count characters.
+fn line_column(text: &str, span: Range<usize>) -> (usize, usize) {
+    let before = text.get(..span.start).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |end| end + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+}

@@ -1,0 +1,73 @@
+//! Methods, tolerances and limits of the solver. Every key has a default, so the section may be absent.
+
+use serde::{Deserialize, Serialize};
+
+/// Settings of Newton's method and of the quadratic programs inside it. All tolerances are relative.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Solver {
+    /// Newton stops when the step is this small in the elastic energy norm (the paper's criterion) ...
+    pub newton_tolerance: f64,
+    /// ... and the true residual of the nonlinear problem is this small too.
+    pub residual_tolerance: f64,
+    /// Newton steps at most.
+    pub newton_limit: usize,
+    /// How exactly a quadratic program is solved.
+    pub qp_tolerance: f64,
+    /// Applications of the Hessian at most, for each quadratic program.
+    pub qp_limit: usize,
+    /// Which solver of quadratic programs.
+    pub qp: Qp,
+    /// Preconditioner of the dual problem.
+    pub preconditioner: Preconditioner,
+    /// How the active set grows inside SMALSE-M.
+    pub expansion: Expansion,
+}
+
+impl Default for Solver {
+    /// The paper's method and tolerances.
+    fn default() -> Self {
+        Solver {
+            newton_tolerance: 1e-4,
+            residual_tolerance: 1e-6,
+            newton_limit: 50,
+            qp_tolerance: 1e-7,
+            qp_limit: 5000,
+            qp: Qp::SmalseM,
+            preconditioner: Preconditioner::None,
+            expansion: Expansion::ProjectedCg,
+        }
+    }
+}
+
+/// Solvers of quadratic programs with bounds and equalities.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Qp {
+    /// Semimonotonic augmented Lagrangians: the paper's, with guaranteed convergence.
+    SmalseM,
+    /// Primal-dual active sets, each an equality-constrained problem.
+    ActiveSet,
+}
+
+/// Preconditioners of the dual problem, cheapest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preconditioner {
+    /// No preconditioner.
+    None,
+    /// The stiffness of the interface nodes alone.
+    Lumped,
+    /// The Schur complement on the interface.
+    Dirichlet,
+}
+
+/// How a step that would leave the bounds continues.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Expansion {
+    /// The full conjugate gradient step, projected onto the bounds.
+    ProjectedCg,
+    /// A half step to the bound, then a projected gradient step of fixed length.
+    Fixed,
+}

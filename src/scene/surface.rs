@@ -1,0 +1,146 @@
+//! Surfaces, addressed as `body.face`, and what happens on them: supports, loads, contact.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::body::Axis;
+
+/// A face of a body, written `body.face`.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct SurfaceName {
+    /// Name of the body.
+    pub body: String,
+    /// Which of its faces.
+    pub face: Face,
+}
+
+/// The six faces of a brick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Face {
+    /// The face with the smallest x.
+    Xmin,
+    /// The face with the largest x.
+    Xmax,
+    /// The face with the smallest y.
+    Ymin,
+    /// The face with the largest y.
+    Ymax,
+    /// The face with the smallest z.
+    Zmin,
+    /// The face with the largest z.
+    Zmax,
+}
+
+impl Face {
+    /// All faces.
+    pub const ALL: [Face; 6] = [Face::Xmin, Face::Xmax, Face::Ymin, Face::Ymax, Face::Zmin, Face::Zmax];
+
+    /// The axis that is normal to the face.
+    pub fn axis(self) -> Axis {
+        Axis::ALL[self as usize / 2]
+    }
+
+    /// Whether the outward normal points along the positive axis.
+    pub fn is_max(self) -> bool {
+        self as usize % 2 == 1
+    }
+
+    /// As in scene files: `xmin`, `xmax`, ...
+    pub fn name(self) -> &'static str {
+        ["xmin", "xmax", "ymin", "ymax", "zmin", "zmax"][self as usize]
+    }
+}
+
+impl fmt::Display for SurfaceName {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}.{}", self.body, self.face.name())
+    }
+}
+
+/// Why a text is not a surface; bodies are looked up later, when all are known.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SurfaceError {
+    /// The text has no dot, or nothing before it.
+    #[error("`{0}` is not a surface: write body.face, as in lower.zmax")]
+    NoBody(String),
+    /// A brick has no such face.
+    #[error("`{face}` is not a face of body `{body}`: a brick has xmin, xmax, ymin, ymax, zmin, zmax")]
+    NoFace {
+        /// The body as written.
+        body: String,
+        /// The face as written.
+        face: String,
+    },
+}
+
+impl FromStr for SurfaceName {
+    type Err = SurfaceError;
+
+    /// Splits at the last dot, so that names of bodies may have dots themselves.
+    fn from_str(text: &str) -> Result<Self, SurfaceError> {
+        let Some((body, face)) = text.rsplit_once('.').filter(|(body, _)| !body.is_empty()) else {
+            return Err(SurfaceError::NoBody(text.to_owned()));
+        };
+        let body = body.to_owned();
+        match Face::ALL.into_iter().find(|known| known.name() == face) {
+            Some(face) => Ok(SurfaceName { body, face }),
+            None => Err(SurfaceError::NoFace { body, face: face.to_owned() }),
+        }
+    }
+}
+
+impl TryFrom<String> for SurfaceName {
+    type Error = SurfaceError;
+
+    fn try_from(text: String) -> Result<Self, SurfaceError> {
+        text.parse()
+    }
+}
+
+impl From<SurfaceName> for String {
+    fn from(name: SurfaceName) -> String {
+        name.to_string()
+    }
+}
+
+/// Prescribed displacement of some components on a surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Support {
+    /// Where.
+    pub surface: SurfaceName,
+    /// The components that are prescribed.
+    pub fix: Vec<Axis>,
+    /// Their values (a length); absent means zero. Components that are not fixed must be 0.
+    pub displacement: Option<[f64; 3]>,
+}
+
+impl Support {
+    /// The prescribed value along this axis, if it is fixed.
+    pub fn prescribed(&self, axis: Axis) -> Option<f64> {
+        self.fix.contains(&axis).then(|| self.displacement.map_or(0.0, |values| values[axis.index()]))
+    }
+}
+
+/// A uniform dead load on a surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Load {
+    /// Where.
+    pub surface: SurfaceName,
+    /// Force per undeformed area, in coordinate directions (a stress).
+    pub traction: [f64; 3],
+}
+
+/// Two surfaces that may touch without friction. Each slave node carries one condition.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// The surface whose nodes are checked.
+    pub slave: SurfaceName,
+    /// The surface of another body, which they must not enter.
+    pub master: SurfaceName,
+}

@@ -1,0 +1,374 @@
+//! Every check by its message, overrides, levels, places, and the library.
+
+use super::*;
+
+const ONE: &str = r#"
+title = "one brick"
+[material.steel]
+young = 210000
+poisson = 0.3
+[body.block]
+material = "steel"
+element = "tet4"
+brick = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }
+[support.base]
+surface = "block.zmin"
+fix = ["x", "y", "z"]
+[decomposition]
+cells = [2, 2, 2]
+"#;
+
+fn sets(list: &[&str]) -> Vec<String> {
+    list.iter().map(ToString::to_string).collect()
+}
+
+fn one(list: &[&str]) -> Result<Scene, SceneError> {
+    Scene::from_text(ONE, "one.toml", 1, &sets(list))
+}
+
+fn two_blocks(list: &[&str]) -> Result<Scene, SceneError> {
+    Scene::load("two-blocks", 1, &sets(list))
+}
+
+#[track_caller]
+fn assert_says(outcome: Result<Scene, SceneError>, parts: &[&str]) {
+    let message = outcome.expect_err("should be refused").to_string();
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+    assert!(!message.contains('\n'), "one paragraph: {message}");
+}
+
+/// The scene is refused after these changes, and the message has these parts.
+#[track_caller]
+fn refuses(changes: &[&str], parts: &[&str]) {
+    assert_says(one(changes), parts);
+}
+
+#[track_caller]
+fn refuses_text(from: &str, to: &str, parts: &[&str]) {
+    assert!(ONE.contains(from));
+    assert_says(Scene::from_text(&ONE.replace(from, to), "one.toml", 1, &[]), parts);
+}
+
+#[test]
+fn the_library_loads_at_several_levels() {
+    for name in library::names() {
+        for level in [1, 2, 3] {
+            let scene = Scene::load(name, level, &[]).unwrap();
+            assert!(scene.warnings().is_empty(), "{name}");
+            assert!(!scene.title.is_empty() && !scene.units.is_empty());
+        }
+    }
+}
+
+#[test]
+fn two_blocks_is_the_benchmark() {
+    let scene = two_blocks(&[]).unwrap();
+    let upper = &scene.body["upper"];
+    assert_eq!(
+        upper.brick,
+        Brick { origin: [600.0, 0.0, 1000.0], size: [3000.0, 1000.0, 1000.0], cells: [30, 10, 10] }
+    );
+    assert_eq!(scene.body.values().map(|body| body.brick.cell_count()).sum::<usize>(), 6000);
+    assert_eq!(scene.material["upper"], scene.material["lower"]);
+    assert_eq!(scene.load["top"].traction, [0.0, 0.0, -150.0]);
+    assert_eq!(scene.contact["joint"].slave.to_string(), "upper.zmin");
+    assert_eq!(scene.decomposition, Decomposition::Bricks { cells: [10, 10, 10] });
+    assert_eq!(scene.solver, Solver::default());
+}
+
+#[test]
+fn the_elastic_variant_differs_in_load_and_yielding_only() {
+    let mut plastic = two_blocks(&["load.top.traction.2=-30"]).unwrap();
+    for material in plastic.material.values_mut() {
+        (material.yield_stress, material.hardening) = (None, 0.0);
+    }
+    let elastic = Scene::load("two-blocks-elastic", 1, &[]).unwrap();
+    assert!(elastic.material.values().all(|material| !material.is_plastic()));
+    plastic.title.clone_from(&elastic.title);
+    assert_eq!(plastic, elastic);
+}
+
+#[test]
+fn effective_scenes_round_trip() {
+    for name in library::names() {
+        let scene = Scene::load(name, 2, &[]).unwrap();
+        let text = scene.to_toml();
+        assert_eq!(Scene::from_text(&text, "echo", 1, &[]).unwrap(), scene, "{text}");
+    }
+    let metis = two_blocks(&["decomposition.subdomains=7", "solver.expansion=fixed"]).unwrap();
+    assert_eq!(Scene::from_text(&metis.to_toml(), "echo", 1, &[]).unwrap(), metis);
+}
+
+#[test]
+fn levels_refine_cells_but_not_subdomains() {
+    let scene = Scene::load("two-blocks", 3, &[]).unwrap();
+    assert_eq!(scene.body["lower"].brick.cells, [90, 30, 30]);
+    assert_eq!(scene.decomposition, Decomposition::Bricks { cells: [10, 10, 10] });
+    assert_says(Scene::load("two-blocks", 0, &[]), &["level 0"]);
+    assert_says(Scene::load("two-blocks", usize::MAX, &[]), &["body.lower.brick.cells", "too many"]);
+}
+
+#[test]
+fn unknown_scenes_list_the_known() {
+    assert_says(Scene::load("three-blocks", 1, &[]), &["three-blocks", "bar, patch, shear, two-blocks", "path"]);
+    assert_says(Scene::load("no/such.toml", 1, &[]), &["no/such.toml"]);
+}
+
+#[test]
+fn files_are_read() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), ONE).unwrap();
+    let scene = Scene::load(file.path().to_str().unwrap(), 1, &[]).unwrap();
+    assert_eq!(scene, one(&[]).unwrap());
+}
+
+#[test]
+fn syntax_and_type_errors_have_a_place() {
+    refuses_text("poisson = 0.3", "poisson = ", &["one.toml, line 5, column 1"]);
+    refuses_text("poisson = 0.3", "poisson = \"a\"", &["one.toml, line 5, column 11", "expected f64"]);
+    refuses_text("poisson = 0.3", "poison = 0.3", &["line 5, column 1", "unknown field `poison`", "poisson"]);
+    refuses_text("poisson = 0.3", "", &["line 3", "missing field `poisson`"]);
+    refuses_text("tet4", "hex27", &["line 8", "hex27", "tet4"]);
+    refuses_text("[support.base]", "[suport.base]", &["line 10", "unknown field `suport`"]);
+    refuses_text("[2, 2, 2] }", "[2, 2] }", &["line 9", "3"]);
+    refuses_text("[2, 2, 2] }", "[2, 2, -2] }", &["line 9", "-2"]);
+}
+
+#[test]
+fn failed_checks_have_a_place() {
+    refuses_text("poisson = 0.3", "poisson = 0.5", &["one.toml, line 5, column 1: material.steel.poisson = 0.5: "]);
+    refuses(&["material.steel.poisson=0.5"], &["--set material.steel.poisson=0.5: material.steel.poisson = 0.5: "]);
+    refuses(
+        &["body.block.brick.size.1=0"],
+        &["--set body.block.brick.size.1=0: body.block.brick.size = [1.0, 0.0, 1.0]"],
+    );
+}
+
+#[test]
+fn materials_are_checked() {
+    for young in ["0", "-1.0", "nan", "inf"] {
+        refuses(&[&format!("material.steel.young={young}")], &["material.steel.young = "]);
+    }
+    for poisson in ["0.5", "-1", "nan", "inf"] {
+        refuses(&[&format!("material.steel.poisson={poisson}")], &["material.steel.poisson = ", "below 0.5"]);
+    }
+    for stress in ["0", "-450", "nan", "inf"] {
+        refuses(&[&format!("material.steel.yield_stress={stress}")], &["material.steel.yield_stress = "]);
+    }
+    for hardening in ["-1", "nan", "inf"] {
+        refuses(&[&format!("material.steel.hardening={hardening}")], &["material.steel.hardening = "]);
+    }
+}
+
+#[test]
+fn bodies_are_checked() {
+    refuses(&["body.block.material=wood"], &["body.block.material = \"wood\"", "known are steel"]);
+    refuses(&["body.block.brick.origin.0=nan"], &["body.block.brick.origin = [NaN, 0.0, 0.0]"]);
+    for size in ["0", "-1", "inf", "nan"] {
+        refuses(&[&format!("body.block.brick.size.2={size}")], &["body.block.brick.size = "]);
+    }
+    refuses(&["body.block.brick.cells.0=0"], &["body.block.brick.cells = [0, 2, 2]", "at least 1"]);
+    assert_says(Scene::from_text("", "empty.toml", 1, &[]), &["empty.toml: body: ", "at least one body"]);
+}
+
+#[test]
+fn surfaces_are_checked() {
+    refuses(&["support.base.surface=blok.zmin"], &["support.base.surface = \"blok.zmin\"", "known are block"]);
+    refuses_text(
+        "block.zmin",
+        "block.bottom",
+        &["line 11", "`bottom`", "`block`", "xmin, xmax, ymin, ymax, zmin, zmax"],
+    );
+    refuses_text("block.zmin", "block", &["line 11", "`block` is not a surface", "body.face"]);
+    refuses_text("block.zmin", ".zmin", &["line 11", "is not a surface"]);
+    let surface: SurfaceName = "part.v2.ymax".parse().unwrap();
+    assert_eq!((surface.body.as_str(), surface.face), ("part.v2", Face::Ymax));
+}
+
+#[test]
+fn faces_know_their_normal_and_name() {
+    for face in Face::ALL {
+        let side = if face.is_max() { "max" } else { "min" };
+        assert_eq!(face.name(), format!("{}{side}", face.axis()));
+    }
+}
+
+#[test]
+fn supports_are_checked() {
+    refuses(&["support.base.fix=[]"], &["support.base.fix = []", "at least one"]);
+    refuses(&["support.base.fix=['x', 'y', 'x']"], &["support.base.fix = [\"x\", \"y\", \"x\"]", "at most once"]);
+    refuses(&["support.base.displacement=[0, nan, 0]"], &["support.base.displacement = ", "finite"]);
+    let partly = ["support.base.fix=['x', 'y']", "support.base.displacement=[0, 1, 2]"];
+    refuses(&partly, &["support.base.displacement = [0.0, 1.0, 2.0]", "component z is not fixed"]);
+    let scene = one(&["support.base.displacement=[0, 1, 2]"]).unwrap();
+    assert_eq!(Axis::ALL.map(|axis| scene.support["base"].prescribed(axis)), [Some(0.0), Some(1.0), Some(2.0)]);
+}
+
+#[test]
+fn supports_must_agree_where_they_meet() {
+    let side = |surface: &str, x: f64| {
+        let side = format!("support.side={{surface = '{surface}', fix = ['x'], displacement = [{x}, 0, 0]}}");
+        one(&[&side])
+    };
+    assert_says(side("block.xmin", 1.0), &["support.side", "support.base", "1.0 along x", "0.0"]);
+    assert_says(side("block.zmin", 1.0), &["support.side", "support.base"]);
+    assert!(side("block.zmax", 1.0).is_ok());
+    assert!(side("block.xmin", 0.0).is_ok());
+}
+
+#[test]
+fn loads_are_checked() {
+    refuses(&["load.top={surface = 'block.zmax', traction = [0, 0, inf]}"], &["load.top.traction = [0.0, 0.0, inf]"]);
+    refuses(&["load.top={surface = 'cube.zmax', traction = [0, 0, 1]}"], &["load.top.surface", "known are block"]);
+}
+
+#[test]
+fn contact_pairs_are_checked() {
+    assert_says(two_blocks(&["contact.joint.slave=middle.zmin"]), &["contact.joint.slave", "known are lower, upper"]);
+    assert_says(two_blocks(&["contact.joint.master=middle.zmin"]), &["contact.joint.master"]);
+    assert_says(two_blocks(&["contact.joint.master=upper.zmax"]), &["contact.joint.master", "different bodies"]);
+}
+
+#[test]
+fn decompositions_are_checked() {
+    refuses(&["decomposition.cells=[0, 2, 2]"], &["decomposition.cells = [0, 2, 2]"]);
+    refuses(
+        &["decomposition.cells=[2, 3, 2]"],
+        &["decomposition.cells = [2, 3, 2]: 3 does not divide the 2 cells", "body block", "along y"],
+    );
+    assert_says(two_blocks(&["decomposition.subdomains=1"]), &["decomposition.subdomains = 1", "2 bodies"]);
+    refuses(&["decomposition.subdomains=49"], &["decomposition.subdomains = 49", "48 elements"]);
+    assert!(one(&["decomposition.subdomains=48"]).is_ok());
+}
+
+#[test]
+fn the_method_follows_the_keys() {
+    let metis = |subdomains| Decomposition::Metis { subdomains };
+    let cut = |text: &str, list: &[&str]| {
+        let text = ONE.replace("cells = [2, 2, 2]\n", text);
+        Scene::from_text(&text, "one.toml", 5, &sets(list)).map(|scene| scene.decomposition)
+    };
+    assert_eq!(cut("", &[]).unwrap(), Decomposition::default());
+    assert_eq!(cut("subdomains = 4", &[]).unwrap(), metis(4));
+    assert_eq!(cut("method = 'metis'\ncells = [9, 9, 9]\nsubdomains = 4", &[]).unwrap(), metis(4));
+    let both = cut("method = 'bricks'\nsubdomains = 4", &[]).unwrap_err().to_string();
+    assert!(both.contains("line 13") && both.contains("method = \"bricks\" is given"), "{both}");
+    let none = cut("method = 'metis'", &[]).unwrap_err().to_string();
+    assert!(none.contains("needs decomposition.subdomains"), "{none}");
+
+    assert_eq!(cut("method = 'bricks'", &["decomposition.subdomains=4"]).unwrap(), metis(4));
+    assert_eq!(cut("subdomains = 4", &["decomposition.method=bricks"]).unwrap(), Decomposition::default());
+    assert!(cut("", &["decomposition.method=bricks", "decomposition.subdomains=4"]).is_err());
+    let supplied = ["decomposition.subdomains=4", "decomposition.method=metis"];
+    assert_eq!(cut("method = 'bricks'", &supplied).unwrap(), metis(4));
+}
+
+#[test]
+fn solver_settings_are_checked() {
+    for key in ["newton_tolerance", "residual_tolerance", "qp_tolerance"] {
+        for value in ["0", "1", "-1e-4", "nan", "inf"] {
+            refuses(&[&format!("solver.{key}={value}")], &[&format!("solver.{key} = "), "above 0 and below 1"]);
+        }
+    }
+    for key in ["newton_limit", "qp_limit"] {
+        refuses(&[&format!("solver.{key}=0")], &[&format!("solver.{key} = 0"), "at least 1"]);
+    }
+    refuses(&["solver.qp=simplex"], &["solver.qp=simplex", "smalse-m", "active-set"]);
+    let scene = one(&["solver.qp=active-set", "solver.preconditioner=dirichlet", "solver.expansion=fixed"]).unwrap();
+    let Solver { qp, preconditioner, expansion, .. } = scene.solver;
+    assert_eq!((qp, preconditioner, expansion), (Qp::ActiveSet, Preconditioner::Dirichlet, Expansion::Fixed));
+}
+
+#[test]
+fn bodies_must_be_held() {
+    refuses(
+        &["support.base.fix=['x', 'y']"],
+        &["body.block", "translation along z, rotation about x, rotation about y:"],
+    );
+    refuses(&["support.base.fix=['z']"], &["translation along x, translation along y, rotation about z:"]);
+    let mut hinge = sets(&["support.base.fix=['z']"]);
+    hinge.push("support.back={surface = 'block.xmin', fix = ['x']}".to_owned());
+    assert_says(Scene::from_text(ONE, "one.toml", 1, &hinge), &["against translation along y:"]);
+    hinge.push("support.side={surface = 'block.ymin', fix = ['y']}".to_owned());
+    assert!(Scene::from_text(ONE, "one.toml", 1, &hinge).is_ok(), "three planes of symmetry hold a body");
+    hinge[1] = "support.back={surface = 'block.zmax', fix = ['y']}".to_owned();
+    assert_says(Scene::from_text(ONE, "one.toml", 1, &hinge), &["against translation along x:"]);
+}
+
+#[test]
+fn thin_bodies_are_held_like_thick_ones() {
+    let clamp = "support.base.surface=block.xmin";
+    for size in ["[1e9, 1e-9, 1]", "[1, 1e-12, 1e-12]"] {
+        assert!(one(&[clamp, &format!("body.block.brick.size={size}")]).is_ok());
+    }
+}
+
+#[test]
+fn contact_may_hold_a_body() {
+    assert!(two_blocks(&[]).unwrap().warnings().is_empty());
+    let loose = two_blocks(&["support.right.fix=['x', 'y']"]).unwrap();
+    let warnings = loose.warnings();
+    assert_eq!(warnings.len(), 1);
+    assert!(warnings[0].contains("body upper"), "{warnings:?}");
+    assert!(warnings[0].contains("1 rigid motion that only contact can hold: translation along z"), "{warnings:?}");
+}
+
+#[test]
+fn overrides_reach_every_kind_of_value() {
+    let changes = [
+        "title=two words",
+        "units='m, N, Pa'",
+        "material.steel.hardening=5",
+        "body.block.brick.origin=[1, 2, 3]",
+        "body.block.brick.size.2=0.5",
+        "support.base.surface=block.xmin",
+        "\"load\".\"on top\" = {surface = \"block.zmax\", traction = [0, 0, 1]}",
+    ];
+    let scene = one(&changes).unwrap();
+    assert_eq!((scene.title.as_str(), scene.units.as_str()), ("two words", "m, N, Pa"));
+    assert_eq!(scene.material["steel"].hardening, 5.0);
+    let Brick { origin, size, .. } = scene.body["block"].brick;
+    assert_eq!((origin, size), ([1.0, 2.0, 3.0], [1.0, 1.0, 0.5]));
+    assert_eq!(scene.support["base"].surface.face, Face::Xmin);
+    assert_eq!(scene.load["on top"].traction, [0.0, 0.0, 1.0]);
+}
+
+#[test]
+fn later_overrides_win_and_build_on_earlier_ones() {
+    let changes =
+        ["title=a", "title=b", "load.new.surface=block.zmax", "load.new.traction=[0, 0, 1]", "load.new.traction.2=2"];
+    let scene = one(&changes).unwrap();
+    assert_eq!(scene.title, "b");
+    assert_eq!(scene.load["new"].traction[2], 2.0);
+}
+
+#[test]
+fn overrides_may_complete_a_file() {
+    let incomplete = ONE.replace("poisson = 0.3", "");
+    assert!(Scene::from_text(&incomplete, "one.toml", 1, &sets(&["material.steel.poisson=0.3"])).is_ok());
+    assert_says(Scene::from_text(&incomplete, "one.toml", 1, &sets(&["title=a"])), &["one.toml, line 3", "poisson"]);
+}
+
+#[test]
+fn overrides_that_do_not_fit_are_named() {
+    refuses(&["title=a", "solver.newton_tol=1e-3"], &["--set solver.newton_tol=1e-3: ", "unknown field `newton_tol`"]);
+    refuses(&["solvr.qp=smalse-m"], &["--set solvr.qp=smalse-m", "unknown field `solvr`"]);
+    refuses(
+        &["body.blok.brick.size=[1, 1, 1]"],
+        &["--set body.blok.brick.size=[1, 1, 1]: unknown key `body.blok`: [body] has block", "missing field"],
+    );
+    refuses(&["solver.qp_limit=many"], &["solver.qp_limit=many", "invalid type", "in `solver.qp_limit`"]);
+    refuses(
+        &["load.a.surface=block.xmin", "load.a.tractoin=[0, 0, 1]"],
+        &["load.a.tractoin", "unknown field `tractoin`"],
+    );
+    refuses(&["title"], &["--set title: write dotted.path=value"]);
+    refuses(&["a b=1"], &["`a b` is not a dotted path"]);
+    refuses(&["=1"], &["not a dotted path"]);
+    refuses(&["title="], &["not a TOML value"]);
+    refuses(&["support.base.fix=[x]"], &["`[x]` is not a TOML value"]);
+    refuses(&["title.length=3"], &["`title` is a single string, it has no `length`"]);
+    refuses(&["body.block.brick.size.3=3"], &["`body.block.brick.size` is an array of 3", "`3` is no index"]);
+}
