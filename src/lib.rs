@@ -4,6 +4,7 @@
 //! [`feti`] + [`qp`] -> [`newton`] -> [`results`]; [`study`] is the only file that sees every stage.
 //! The method is the one of Cermak and Sysala, "Total-FETI method for solving contact elasto-plastic problems".
 
+pub mod analytic;
 pub mod comm;
 pub mod element;
 pub mod material;
