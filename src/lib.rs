@@ -4,6 +4,7 @@
 //! [`feti`] + [`qp`] -> [`newton`] -> [`results`]; [`study`] is the only file that sees every stage.
 //! The method is the one of Cermak and Sysala, "Total-FETI method for solving contact elasto-plastic problems".
 
+pub mod analytic;
 pub mod assembly;
 pub mod comm;
 pub mod constraint;
@@ -17,6 +18,7 @@ pub mod monitor;
 pub mod newton;
 pub mod qp;
 pub mod scene;
+pub mod study;
 pub mod tensor;
 
 #[cfg(test)]

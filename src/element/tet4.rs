@@ -62,9 +62,9 @@ impl Tet4 {
     pub fn strain(&self, u: &[f64; 12]) -> Voigt {
         let mut h = [[0.0; 3]; 3];
         for (a, g) in self.gradients.iter().enumerate() {
-            for i in 0..3 {
-                for j in 0..3 {
-                    h[i][j] += u[3 * a + i] * g[j];
+            for (row, u) in h.iter_mut().zip(&u[3 * a..]) {
+                for (entry, g) in row.iter_mut().zip(g) {
+                    *entry += u * g;
                 }
             }
         }
@@ -103,8 +103,9 @@ impl Tet4 {
             }
         }
         for i in 1..12 {
-            for j in 0..i {
-                k[i][j] = k[j][i];
+            let (above, below) = k.split_at_mut(i);
+            for (entry, row) in below[0].iter_mut().zip(above) {
+                *entry = row[i];
             }
         }
         k
@@ -168,11 +169,7 @@ mod tests {
         for corners in shapes() {
             let k = Tet4::new(&corners).expect("it has a volume").stiffness(&STEEL.elastic_tangent());
             let scale = k[0][0];
-            for i in 0..12 {
-                for j in 0..12 {
-                    assert_eq!(k[i][j], k[j][i]);
-                }
-            }
+            assert!((0..144).all(|n| k[n / 12][n % 12] == k[n % 12][n / 12]));
             for axis in 0..3 {
                 let along = field(&corners, |_| std::array::from_fn(|i| (i == axis) as u8 as f64));
                 let around = field(&corners, |x| {

@@ -7,9 +7,9 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::{self as numeric, LltRegularization};
+use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::prelude::MatMut;
-use faer::sparse::linalg::LltError;
+
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Par, Side, Spec};
@@ -240,11 +240,10 @@ impl CoarseFactor {
         let result = Self { symbolic, values: factor, scratch: RefCell::new(scratch) };
         match outcome {
             Ok(()) => result.check_rank(largest).map(|()| result),
-            Err(LltError::Numeric(numeric::LltError::NonPositivePivot { index })) => {
+            Err(LltError::NonPositivePivot { index }) => {
                 let column = result.symbolic.perm().map_or(index, |p| p.arrays().0[index] as usize);
                 Err(Floating { subdomain: column / MODES })
             }
-            Err(LltError::Generic(error)) => panic!("the coarse problem does not fit in memory: {error}"),
         }
     }
 

@@ -125,7 +125,7 @@ impl<'a> StepSolver<'a> {
         coarse.add_transpose(1.0, &imbalance, &mut start);
         if self.lambda.is_some() {
             // The correction was round-off or the last tolerance: it must not push contact forces below zero.
-            for (l, row) in start.iter_mut().zip(&problem.constraints.rows).filter(|(_, row)| row.is_inequality()) {
+            for (l, _) in start.iter_mut().zip(&problem.constraints.rows).filter(|(_, row)| row.is_inequality()) {
                 *l = l.max(0.0);
             }
         }

@@ -1,0 +1,141 @@
+//! A thick cylinder in plane strain under inside pressure, perfectly plastic: Hill's solution for Tresca's criterion with
+//! von Mises' shear yield stress, Y = 2 sigma_y / sqrt 3 (de Souza Neto, Peric, Owen, 7.5.1).
+//!
+//! ```text
+//! p(c) = Y ln(c/a) + (Y/2) (1 - c^2/b^2),   u(b) = Y c^2 (1 - nu^2) / (E b)
+//! ```
+//!
+//! The stress path is not proportional and von Mises differs from Tresca along z: compare with many load steps and allow
+//! about one percent. Hardening is ignored; with it no closed form exists.
+
+use super::bisect;
+use crate::material::Material;
+
+/// Geometry and material; the hardening is not used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cylinder {
+    /// Inner radius a > 0.
+    pub inner: f64,
+    /// Outer radius b > a.
+    pub outer: f64,
+    pub material: Material,
+}
+
+/// The cylinder under load.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CylinderState {
+    cylinder: Cylinder,
+    /// S = r^2 (sigma_t - sigma_r) where it is elastic, Y c^2 once it yields.
+    intensity: f64,
+    front: f64,
+}
+
+impl Cylinder {
+    /// Largest difference Y of hoop and radial stress; infinite without yielding.
+    fn strength(&self) -> f64 {
+        self.material.yield_stress.map_or(f64::INFINITY, |limit| 2.0 * limit / 3f64.sqrt())
+    }
+
+    /// Inside pressure that brings the plastic front to the radius `front` in [a, b]; infinite without yielding.
+    pub fn pressure_of_front(&self, front: f64) -> f64 {
+        let shape = (front / self.inner).ln() + 0.5 * (1.0 - (front / self.outer).powi(2));
+        self.strength() * shape
+    }
+
+    /// Collapse pressure Y ln(b/a).
+    pub fn limit_pressure(&self) -> f64 {
+        self.strength() * (self.outer / self.inner).ln()
+    }
+
+    /// The state under an inside pressure >= 0; `None` beyond the collapse pressure.
+    pub fn loaded(&self, pressure: f64) -> Option<CylinderState> {
+        if pressure > self.limit_pressure() {
+            return None;
+        }
+        let state = |intensity, front| CylinderState { cylinder: *self, intensity, front };
+        if pressure <= self.pressure_of_front(self.inner) {
+            let intensity = 2.0 * pressure / (self.inner.powi(-2) - self.outer.powi(-2));
+            return Some(state(intensity, self.inner));
+        }
+        let front = bisect(self.inner, self.outer, |front| self.pressure_of_front(front) < pressure);
+        Some(state(self.strength() * front * front, front))
+    }
+}
+
+impl CylinderState {
+    /// Radius of the plastic front c; the inner radius if nothing has yielded.
+    pub fn front(&self) -> f64 {
+        self.front
+    }
+
+    /// Radial stress at radius `r`.
+    pub fn radial_stress(&self, r: f64) -> f64 {
+        let from = r.max(self.front);
+        let elastic = -0.5 * self.intensity * (from.powi(-2) - self.cylinder.outer.powi(-2));
+        elastic - self.intensity / (self.front * self.front) * (from / r).ln()
+    }
+
+    /// Hoop stress at radius `r`.
+    pub fn hoop_stress(&self, r: f64) -> f64 {
+        self.radial_stress(r) + self.intensity / r.max(self.front).powi(2)
+    }
+
+    /// Radial displacement of the outer surface, outwards.
+    pub fn outer_displacement(&self) -> f64 {
+        let m = &self.cylinder.material;
+        self.intensity * (1.0 - m.poisson * m.poisson) / (m.young * self.cylinder.outer)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CYLINDER: Cylinder = Cylinder {
+        inner: 100.0,
+        outer: 200.0,
+        material: Material { young: 210.0, poisson: 0.3, yield_stress: Some(0.24), hardening: 0.0 },
+    };
+
+    #[test]
+    fn published_numbers() {
+        assert!((CYLINDER.pressure_of_front(100.0) - 0.103923).abs() < 1e-6);
+        assert!((CYLINDER.limit_pressure() - 0.192091).abs() < 1e-6);
+        for (p, c, u) in [
+            (0.10, 100.0, 0.0577778),
+            (0.14, 120.538801, 0.0872422),
+            (0.18, 159.785289, 0.1533015),
+            (0.19, 182.887937, 0.2008366),
+        ] {
+            let state = CYLINDER.loaded(p).expect("below collapse");
+            assert!((state.front() - c).abs() < 1e-6);
+            assert!((state.outer_displacement() - u).abs() < 1e-7);
+        }
+        assert_eq!(CYLINDER.loaded(0.1921), None);
+    }
+
+    #[test]
+    fn balanced_at_every_radius_and_loaded_inside_only() {
+        let h = 1e-3;
+        for p in [0.05, 0.14, 0.19] {
+            let state = CYLINDER.loaded(p).expect("below collapse");
+            assert!((state.radial_stress(100.0) + p).abs() < 1e-14 && state.radial_stress(200.0).abs() < 1e-16);
+            for r in (0..99).map(|k| 100.5 + k as f64) {
+                let slope = (state.radial_stress(r + h) - state.radial_stress(r - h)) / (2.0 * h);
+                let difference = state.hoop_stress(r) - state.radial_stress(r);
+                assert!((slope - difference / r).abs() < 1e-9);
+                assert!(difference <= CYLINDER.strength() * (1.0 + 1e-12));
+            }
+        }
+    }
+
+    /// Plane strain Hooke at the outer surface: u / b = (1 - nu^2) sigma_t / E where sigma_r vanishes.
+    #[test]
+    fn outer_displacement_is_the_hoop_strain() {
+        for p in [0.05, 0.14, 0.19] {
+            let state = CYLINDER.loaded(p).expect("below collapse");
+            let hoop = 0.91 * state.hoop_stress(200.0) / 210.0;
+            assert!((state.outer_displacement() / 200.0 - hoop).abs() < 1e-16);
+        }
+    }
+}

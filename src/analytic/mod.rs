@@ -1,0 +1,25 @@
+//! Closed forms to compare a computation with: no mesh, no element, no solver.
+//!
+//! All of them but [`cylinder`] have proportional deviatoric paths, so that one implicit step from the virgin state is
+//! exact and the one-step program must meet them up to discretisation.
+
+pub mod blocks;
+pub mod cylinder;
+pub mod hollow_sphere;
+pub mod homogeneous;
+pub mod nested_spheres;
+
+/// The point of [low, high] where `is_below` turns from true to false, to the last bit.
+fn bisect(mut low: f64, mut high: f64, is_below: impl Fn(f64) -> bool) -> f64 {
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return middle;
+        }
+        if is_below(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+}
