@@ -77,9 +77,8 @@ impl Constraints {
         self.block_subdomains.push(subdomains);
         for mut row in rows {
             let number = self.rows.len() as u32;
-            let mut terms = std::mem::take(&mut row.terms);
-            terms.sort_by_key(|t| (t.subdomain, t.node, t.axis));
-            for part in terms.chunk_by(|a, b| a.subdomain == b.subdomain) {
+            row.terms.sort_by_key(|t| (t.subdomain, t.node, t.axis));
+            for part in row.terms.chunk_by(|a, b| a.subdomain == b.subdomain) {
                 let slot = self.slot_subdomain.len() as u32;
                 self.slot_subdomain.push(part[0].subdomain);
                 let Some(own) = decomposition.own_index(part[0].subdomain) else { continue };

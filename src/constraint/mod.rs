@@ -97,7 +97,7 @@ pub struct Entry {
 
 /// The rows that one rank holds.
 pub struct Constraints {
-    /// Rows, block by block in the order of the blocks' lowest nodes. Terms are empty: they are in `entries`.
+    /// Rows, block by block in the order of the blocks' lowest nodes. Terms are sorted by subdomain: one slot each.
     pub rows: Vec<Row>,
     /// Rows of each block.
     pub blocks: Vec<Range<usize>>,

@@ -45,6 +45,8 @@ pub struct NotDefinite {
 pub struct Symbolic {
     /// Sparsity of `K + rho Q`.
     pub pattern: Pattern,
+    /// Elimination order: the unknown at each place.
+    pub order: Vec<u32>,
     /// Local fixing nodes.
     fixing: Vec<u32>,
     cholesky: SymbolicCholesky<u32>,
@@ -68,7 +70,7 @@ impl Symbolic {
             params,
         )
         .expect("a subdomain's factor fits in memory and its index type");
-        Self { pattern, fixing, cholesky }
+        Self { pattern, order: forward, fixing, cholesky }
     }
 
     /// Whether a subdomain may share this analysis.
@@ -135,7 +137,7 @@ impl Factors {
     /// # Errors
     /// If the matrix is not positive definite, or not finite.
     pub fn factorise(&mut self, own: usize, subdomain: &Subdomain, stiffness: &[f64]) -> Result<(), NotDefinite> {
-        let Symbolic { pattern, fixing, cholesky } = &*self.symbolic[own];
+        let Symbolic { pattern, fixing, cholesky, .. } = &*self.symbolic[own];
         let n = pattern.dofs();
         self.shifted.clear();
         self.shifted.extend_from_slice(stiffness);

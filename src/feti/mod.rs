@@ -7,9 +7,12 @@ pub mod coarse;
 pub mod factor;
 pub mod gather;
 pub mod kernel;
+pub mod interior;
 pub mod operator;
 pub mod ordering;
+pub mod preconditioner;
 pub mod projector;
+pub mod scaling;
 pub mod space;
 
 /// A torn vector: for each own subdomain its local unknowns.

@@ -51,7 +51,7 @@ pub fn search(
     }
     let first_slope = problem.slope(state, du);
     // Below this, energies differ by round-off only.
-    let noise = 1e-14 * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs());
+    let noise = 1e-12 * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs());
     let lowers = |t: &Damped| t.state.energy <= state.energy + SUFFICIENT * t.length * first_slope.min(0.0) + noise;
     if lowers(&full) {
         return Some(full);

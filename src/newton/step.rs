@@ -53,6 +53,7 @@ pub struct StepSolver<'a> {
     tangents: Vec<(Vec<f64>, Option<usize>)>,
     lambda: Option<Vec<f64>>,
     reference: Option<f64>,
+ norm: Option<f64>,
 }
 
 impl<'a> StepSolver<'a> {
@@ -65,6 +66,7 @@ impl<'a> StepSolver<'a> {
             tangents: vec![(Vec::new(), None); own],
             lambda: None,
             reference: None,
+ norm: None,
         }
     }
 
@@ -183,7 +185,7 @@ impl<'a> StepSolver<'a> {
         let limits = Limits {
             relative: self.settings.tolerance,
             reference: Some(reference),
-            absolute: f64::MIN_POSITIVE,
+            absolute: size * std::env::var("ETA").map_or(0.0, |s| s.parse().unwrap()),
             products: self.settings.products,
         };
         let mut x = vec![0.0; b.len()];
@@ -191,9 +193,14 @@ impl<'a> StepSolver<'a> {
             return (x, Outcome::Converged, Statistics::default());
         }
         if problem.constraints.has_inequalities {
+            if self.norm.is_none() || std::env::var("RENORM").is_ok() {
             let Some(estimate) = power::norm(&space, &mut operator, &mut projection, &projected) else {
                 return (x, Outcome::NotFinite, Statistics::default());
             };
+            self.norm = Some(estimate.norm);
+            println!("norm {} {}", estimate.norm, estimate.products);
+            }
+            let estimate = power::Estimate { norm: self.norm.unwrap(), products: 0 };
             let lower = problem
                 .constraints
                 .rows

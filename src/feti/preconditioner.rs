@@ -1,0 +1,79 @@
+//! Preconditioners of the dual operator: `B_D S B_D'` with `S` the boundary block of the stiffness (lumped) or its Schur
+//! complement (Dirichlet); Farhat, Mandel and Roux 1994, with the stiffness scaling of [`super::scaling`].
+
+use super::Torn;
+use super::gather::Gather;
+use super::interior::InteriorFactors;
+use super::scaling::Scaling;
+use crate::assembly::pattern::Pattern;
+
+/// Approximate inverse of `F`; counts its applications.
+pub struct Preconditioner<'a> {
+    gather: &'a Gather<'a>,
+    /// Interior factors of the Dirichlet preconditioner; none for the lumped one.
+    pub interior: Option<InteriorFactors>,
+    /// Scaling of the rows; set by the caller before the first application, and when tangents or rows change.
+    pub scaling: Scaling,
+    /// Local unknowns that rows touch, for each own subdomain.
+    boundary: Vec<Vec<u32>>,
+    torn: Torn,
+    rows: Vec<f64>,
+    applications: usize,
+}
+
+/// Unknowns of each own subdomain that rows touch, ascending.
+pub fn boundaries(gather: &Gather, own: usize) -> Vec<Vec<u32>> {
+    (0..own)
+        .map(|own| {
+            let mut dofs: Vec<u32> = gather.entries(own).iter().map(|entry| entry.dof).collect();
+            dofs.sort_unstable();
+            dofs.dedup();
+            dofs
+        })
+        .collect()
+}
+
+impl<'a> Preconditioner<'a> {
+    /// Dirichlet with interior factors, lumped without.
+    pub fn new(gather: &'a Gather<'a>, interior: Option<InteriorFactors>, scaling: Scaling) -> Self {
+        let torn = gather.zeros();
+        let boundary = boundaries(gather, torn.len());
+        Self { gather, interior, scaling, boundary, rows: vec![0.0; gather.rows()], torn, applications: 0 }
+    }
+
+    /// `y = B_D S B_D' x`, `stiffness(own)` being the sparsity and the lower values. One neighbour exchange.
+    pub fn apply<'k>(&mut self, stiffness: impl Fn(usize) -> (&'k Pattern, &'k [f64]), x: &[f64], y: &mut [f64]) {
+        self.applications += 1;
+        self.scaling.solve(x, &mut self.rows);
+        for own in 0..self.torn.len() {
+            let (pattern, values) = stiffness(own);
+            let flexibility = &self.scaling.flexibility[own];
+            let mut t = vec![0.0; pattern.dofs()];
+            self.gather.add_transpose_one(own, 1.0, &self.rows, &mut t);
+            t.iter_mut().zip(flexibility).for_each(|(t, f)| *t *= f);
+            let mut forces = vec![0.0; t.len()];
+            pattern.multiply_add(values, &t, &mut forces);
+            if let Some(factors) = &mut self.interior {
+                let interior = &factors.symbolic(own).interior;
+                let mut inside: Vec<f64> = interior.iter().map(|&dof| forces[dof as usize]).collect();
+                let interior = interior.clone();
+                factors.solve(own, &mut inside);
+                let mut correction = vec![0.0; t.len()];
+                interior.iter().zip(&inside).for_each(|(&dof, x)| correction[dof as usize] = -x);
+                pattern.multiply_add(values, &correction, &mut forces);
+            }
+            let out = &mut self.torn[own];
+            out.fill(0.0);
+            for &dof in &self.boundary[own] {
+                out[dof as usize] = flexibility[dof as usize] * forces[dof as usize];
+            }
+        }
+        self.gather.apply(&self.torn, &mut self.rows);
+        self.scaling.solve(&self.rows, y);
+    }
+
+    /// Applications so far.
+    pub fn applications(&self) -> usize {
+        self.applications
+    }
+}
