@@ -6,3 +6,4 @@
 
 pub mod comm;
 pub mod qp;
+pub mod results;
