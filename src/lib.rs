@@ -5,5 +5,6 @@
 //! The method is the one of Cermak and Sysala, "Total-FETI method for solving contact elasto-plastic problems".
 
 pub mod comm;
+pub mod monitor;
 pub mod qp;
 pub mod results;

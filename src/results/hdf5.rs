@@ -6,13 +6,15 @@
 //! properties, so the transfer itself is a call into the C library. After every collective step the ranks agree on its
 //! outcome: a rank whose disk is full must not leave the others waiting in the next one.
 //! Time stamps are off, so the same results give the same bytes.
+//!
+//! Success of a write is not proof: Open MPI 4.1's collective write prints "No space left on device" and reports success
+//! to HDF5. So a file is read back after it was closed, by the same sequence of calls on a [`SharedFile::reopen`]ed one.
 
-use std::ffi::c_void;
 use std::path::Path;
 
 use hdf5_metno::types::{FixedAscii, TypeDescriptor};
 use hdf5_metno::{Dataset, File, FileBuilder, H5Type, globals, h5check, sync::sync};
-use hdf5_metno_sys::h5d::H5Dwrite;
+use hdf5_metno_sys::h5d::{H5Dread, H5Dwrite};
 use hdf5_metno_sys::h5i::hid_t;
 use hdf5_metno_sys::h5p::{H5FD_mpio_xfer_t, H5P_DEFAULT, H5Pclose, H5Pcreate, H5Pset_dxpl_mpio};
 use hdf5_metno_sys::h5s::{H5S_SELECT_SET, H5Sclose, H5Screate_simple, H5Sselect_hyperslab, H5Sselect_none};
@@ -20,12 +22,26 @@ use hdf5_metno_sys::h5s::{H5S_SELECT_SET, H5Sclose, H5Screate_simple, H5Sselect_
 use super::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
 
-/// A new file, open for writing on every rank of `comm`. All methods are collective, and their errors, which say what
-/// failed on which rank, are the same on every rank.
+/// A file open on every rank of `comm`: a new one to be written, or a written one to be compared. All methods are
+/// collective, and their errors, which say what failed on which rank, are the same on every rank.
 pub struct SharedFile<'a> {
     file: File,
     comm: &'a dyn Comm,
+    task: Task,
 }
+
+#[derive(Clone, Copy, PartialEq)]
+enum Task {
+    Write,
+    Compare,
+}
+
+/// Numbers that arrays consist of: any bytes of their size are one.
+pub trait Number: H5Type {}
+
+impl Number for f64 {}
+impl Number for i64 {}
+impl Number for u8 {}
 
 impl<'a> SharedFile<'a> {
     /// Creates or truncates a file: through MPI-IO if the ranks are MPI processes, else by the only rank.
@@ -33,12 +49,17 @@ impl<'a> SharedFile<'a> {
     /// # Errors
     /// If HDF5 cannot create it.
     pub fn create(comm: &'a dyn Comm, path: &Path) -> Result<Self, String> {
-        let mut builder = FileBuilder::new();
-        if let Some(raw) = comm.raw_mpi() {
-            builder.with_fapl(|access| access.mpio(raw, None).all_coll_metadata_ops(true).coll_metadata_write(true));
-        }
-        let file = agree(comm, "creating the HDF5 file", builder.create(path))?;
-        Ok(Self { file, comm })
+        let file = agree(comm, "creating the HDF5 file", access(comm).create(path))?;
+        Ok(Self { file, comm, task: Task::Write })
+    }
+
+    /// Opens a file to compare it with what was to be written: the calls that wrote it now fail where it differs.
+    ///
+    /// # Errors
+    /// If HDF5 cannot open it.
+    pub fn reopen(comm: &'a dyn Comm, path: &Path) -> Result<Self, String> {
+        let file = agree(comm, "reading the file back", access(comm).open(path))?;
+        Ok(Self { file, comm, task: Task::Compare })
     }
 
     /// Creates a group.
@@ -46,7 +67,11 @@ impl<'a> SharedFile<'a> {
     /// # Errors
     /// If HDF5 refuses, e.g. because the name is taken.
     pub fn group(&self, name: &str) -> Result<(), String> {
-        agree(self.comm, name, self.file.create_group(name).map(drop))
+        let group = match self.task {
+            Task::Write => self.file.create_group(name),
+            Task::Compare => self.file.group(name),
+        };
+        agree(self.comm, name, group.map(drop))
     }
 
     /// Gives a group an attribute of a few numbers, the same on every rank.
@@ -54,8 +79,11 @@ impl<'a> SharedFile<'a> {
     /// # Errors
     /// If HDF5 refuses.
     pub fn attribute(&self, group: &str, name: &str, values: &[i64]) -> Result<(), String> {
-        let write = || self.file.group(group)?.new_attr_builder().with_data(values).create(name).map(drop);
-        agree(self.comm, name, write())
+        let write = || match self.task {
+            Task::Write => self.file.group(group)?.new_attr_builder().with_data(values).create(name),
+            Task::Compare => self.file.group(group)?.attr(name),
+        };
+        agree(self.comm, name, write().map(drop))
     }
 
     /// Gives a group an attribute that is an ASCII text of exactly `N` bytes, without an end mark.
@@ -65,7 +93,10 @@ impl<'a> SharedFile<'a> {
     pub fn text_attribute<const N: usize>(&self, group: &str, name: &str, text: &str) -> Result<(), String> {
         let write = || {
             let text = FixedAscii::<N>::from_ascii(text).map_err(|e| hdf5_metno::Error::from(e.to_string()))?;
-            self.file.group(group)?.new_attr::<FixedAscii<N>>().create(name)?.write_scalar(&text)
+            match self.task {
+                Task::Write => self.file.group(group)?.new_attr::<FixedAscii<N>>().create(name)?.write_scalar(&text),
+                Task::Compare => self.file.group(group)?.attr(name).map(drop),
+            }
         };
         agree(self.comm, name, write())
     }
@@ -75,14 +106,17 @@ impl<'a> SharedFile<'a> {
     ///
     /// # Errors
     /// If HDF5 refuses or the disk is full.
-    pub fn rows<T: H5Type>(&self, name: &str, width: usize, mine: &[T]) -> Result<(), String> {
-        let counts = all_gather_u64(self.comm, &[(mine.len() / width) as u64]);
+    pub fn rows<T: Number>(&self, name: &str, width: usize, mine: &[T]) -> Result<(), String> {
+        let count = (mine.len() / width) as u64;
+        let counts = all_gather_u64(self.comm, &[count]);
         let begin = counts[..self.comm.rank()].iter().sum();
         let total = counts.iter().sum::<u64>() as usize;
         let shape = if width == 1 { vec![total] } else { vec![total, width] };
-        let builder = self.file.new_dataset::<T>().obj_track_times(false);
-        let dataset = agree(self.comm, name, builder.shape(shape).create(name))?;
-        agree(self.comm, name, self.transfer(&dataset, begin, (mine.len() / width) as u64, mine.as_ptr().cast()))
+        let dataset =
+            self.dataset(name, || self.file.new_dataset::<T>().obj_track_times(false).shape(shape).create(name))?;
+        // Safety: numbers may be seen as bytes.
+        let bytes = unsafe { std::slice::from_raw_parts(mine.as_ptr().cast::<u8>(), size_of_val(mine)) };
+        agree(self.comm, name, self.transfer(&dataset, begin, count, bytes))
     }
 
     /// Writes a text, the same on every rank, as a scalar dataset of a UTF-8 string of fixed length.
@@ -92,10 +126,11 @@ impl<'a> SharedFile<'a> {
     pub fn text(&self, name: &str, text: &str) -> Result<(), String> {
         // HDF5 has no strings of length 0.
         let text = if text.is_empty() { " " } else { text };
-        let builder = self.file.new_dataset_builder().empty_as(TypeDescriptor::FixedUnicode(text.len()));
-        let dataset = agree(self.comm, name, builder.obj_track_times(false).create(name))?;
-        let mine = u64::from(self.comm.rank() == 0);
-        agree(self.comm, name, self.transfer(&dataset, 0, mine, text.as_ptr().cast()))
+        let kind = TypeDescriptor::FixedUnicode(text.len());
+        let builder = self.file.new_dataset_builder().empty_as(kind).obj_track_times(false);
+        let dataset = self.dataset(name, || builder.create(name))?;
+        let mine = if self.comm.rank() == 0 { text.as_bytes() } else { &[] };
+        agree(self.comm, name, self.transfer(&dataset, 0, u64::from(!mine.is_empty()), mine))
     }
 
     /// Closes the file; what HDF5 still held in memory is written now.
@@ -106,16 +141,42 @@ impl<'a> SharedFile<'a> {
         agree(self.comm, "closing the file", self.file.close())
     }
 
-    /// Moves this rank's `count` rows at `data` to the dataset's rows from `begin` on.
-    fn transfer(&self, dataset: &Dataset, begin: u64, count: u64, data: *const c_void) -> hdf5_metno::Result<()> {
+    fn dataset(&self, name: &str, create: impl FnOnce() -> hdf5_metno::Result<Dataset>) -> Result<Dataset, String> {
+        agree(
+            self.comm,
+            name,
+            match self.task {
+                Task::Write => create(),
+                Task::Compare => self.file.dataset(name),
+            },
+        )
+    }
+
+    /// Moves this rank's `count` rows to the dataset's rows from `begin` on, or compares them with those.
+    fn transfer(&self, dataset: &Dataset, begin: u64, count: u64, mine: &[u8]) -> hdf5_metno::Result<()> {
         let kind = dataset.dtype()?;
         let shape: Vec<u64> = dataset.shape().into_iter().map(|n| n as u64).collect();
         let (here, there) = (Selection::rows(&shape, 0, count)?, Selection::rows(&shape, begin, count)?);
         let properties = TransferProperties::new(self.comm.raw_mpi().is_some())?;
-        // Safety: `data` holds `count` rows of the dataset's own type, and the selections stay inside their extents.
-        let write = || unsafe { h5check(H5Dwrite(dataset.id(), kind.id(), here.0, there.0, properties.0, data)) };
-        sync(write).map(drop)
+        let (to, of, with) = (dataset.id(), kind.id(), properties.0);
+        // Safety: the buffers hold `count` rows of the dataset's own type, and the selections stay inside their extents.
+        if self.task == Task::Write {
+            return sync(|| unsafe { h5check(H5Dwrite(to, of, here.0, there.0, with, mine.as_ptr().cast())) })
+                .map(drop);
+        }
+        let mut read = vec![0; mine.len()];
+        sync(|| unsafe { h5check(H5Dread(to, of, here.0, there.0, with, read.as_mut_ptr().cast())) })?;
+        if read == mine { Ok(()) } else { Err("reads back differently: is the disk full?".into()) }
     }
+}
+
+/// Through MPI-IO if the ranks are MPI processes.
+fn access(comm: &dyn Comm) -> FileBuilder {
+    let mut builder = FileBuilder::new();
+    if let Some(raw) = comm.raw_mpi() {
+        builder.with_fapl(|access| access.mpio(raw, None).all_coll_metadata_ops(true).coll_metadata_write(true));
+    }
+    builder
 }
 
 /// A data space with some of its rows selected.

@@ -53,7 +53,7 @@ fn check(comm: &dyn Comm, piece: &Piece) -> Result<(), String> {
     agree(comm, "the fields", same)
 }
 
-/// Writes the pieces of the given sizes that lie one behind the other in `rows`.
+/// Writes the pieces of the given sizes that lie one behind the other in `rows`, and reads them back.
 fn write_rows(
     comm: &dyn Comm,
     path: &Path,
@@ -61,7 +61,18 @@ fn write_rows(
     sizes: &[[usize; 3]],
     records: &Records,
 ) -> Result<(), String> {
-    let file = SharedFile::create(comm, path)?;
+    for open in [SharedFile::create, SharedFile::reopen] {
+        let file = open(comm, path)?;
+        put_mesh(&file, rows, sizes)?;
+        put_fields(&file, "VTKHDF/PointData", &rows.point_data)?;
+        put_fields(&file, "VTKHDF/CellData", &rows.cell_data)?;
+        put_records(comm, &file, records)?;
+        file.close()?;
+    }
+    Ok(())
+}
+
+fn put_mesh(file: &SharedFile, rows: &Piece, sizes: &[[usize; 3]]) -> Result<(), String> {
     file.group("VTKHDF")?;
     file.attribute("VTKHDF", "Version", &VERSION)?;
     file.text_attribute::<16>("VTKHDF", "Type", "UnstructuredGrid")?;
@@ -72,14 +83,10 @@ fn write_rows(
     file.rows("VTKHDF/Points", 3, rows.points.as_flattened())?;
     file.rows("VTKHDF/Connectivity", 1, &signed(&rows.connectivity))?;
     file.rows("VTKHDF/Offsets", 1, &signed(&rows.offsets))?;
-    file.rows("VTKHDF/Types", 1, &rows.types)?;
-    write_fields(&file, "VTKHDF/PointData", &rows.point_data)?;
-    write_fields(&file, "VTKHDF/CellData", &rows.cell_data)?;
-    write_records(comm, &file, records)?;
-    file.close()
+    file.rows("VTKHDF/Types", 1, &rows.types)
 }
 
-fn write_fields(file: &SharedFile, group: &str, fields: &[Field]) -> Result<(), String> {
+fn put_fields(file: &SharedFile, group: &str, fields: &[Field]) -> Result<(), String> {
     file.group(group)?;
     for Field { name, components, values } in fields {
         let name = format!("{group}/{name}");
@@ -91,7 +98,7 @@ fn write_fields(file: &SharedFile, group: &str, fields: &[Field]) -> Result<(), 
     Ok(())
 }
 
-fn write_records(comm: &dyn Comm, file: &SharedFile, records: &Records) -> Result<(), String> {
+fn put_records(comm: &dyn Comm, file: &SharedFile, records: &Records) -> Result<(), String> {
     file.group("provenance")?;
     let texts = root_texts(comm, records.provenance.iter().flat_map(|(name, text)| [name.as_str(), text.as_str()]));
     for pair in texts.chunks_exact(2) {
