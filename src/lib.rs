@@ -17,6 +17,7 @@ pub mod mesh;
 pub mod monitor;
 pub mod newton;
 pub mod qp;
+pub mod results;
 pub mod scene;
 pub mod study;
 pub mod tensor;

@@ -1,0 +1,56 @@
+//! The events of a run.
+
+use super::timing::PhaseTable;
+use crate::results::summary::{NewtonRow, Residuals, Sizes};
+
+/// Something that happened and is worth telling; numbers are those of all ranks together.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The problem is set up.
+    Sizes {
+        /// Name or path of the scene, and its level.
+        scene: String,
+        /// Refinement level.
+        level: usize,
+        /// Number of ranks.
+        ranks: usize,
+        /// Sizes of the problem.
+        sizes: Sizes,
+    },
+    /// The QP solver is at work; sent as often as it likes.
+    Inner {
+        /// Newton step, from 1.
+        step: u64,
+        /// Outer iterations of the QP solver in this step.
+        qp_iterations: u64,
+        /// Applications of F in this step.
+        hessian_multiplications: u64,
+        /// Relative residual of the QP.
+        residual: f64,
+    },
+    /// A Newton step is done.
+    NewtonStep(NewtonRow),
+    /// Something the user should know.
+    Warning(String),
+    /// Where the time went.
+    Phases(PhaseTable),
+    /// How well the equations hold in the end.
+    Residuals(Residuals),
+    /// The run is over.
+    Outcome {
+        /// Whether Newton's method converged.
+        converged: bool,
+        /// Newton steps.
+        newton_iterations: u64,
+        /// Wall time in seconds.
+        seconds: f64,
+        /// Why it did not converge, or where the results are.
+        note: String,
+    },
+}
+
+/// Shows events.
+pub trait Sink {
+    /// Called for every event, in order.
+    fn event(&mut self, event: &Event);
+}

@@ -1,0 +1,39 @@
+//! What a run tells while it runs: typed events on one side, sinks that show them on the other.
+//!
+//! The stages send [`events::Event`]s to a [`Monitor`]; only rank 0's shows anything. Log lines go through `tracing`, so
+//! the program decides where they end up; [`timing`] measures phases and compares them over the ranks.
+//! Nothing here is read back by the numerics.
+
+pub mod events;
+pub mod plain;
+pub mod progress;
+pub mod timing;
+
+use events::{Event, Sink};
+use plain::Plain;
+use progress::{Mode, Progress};
+
+/// Sends every event to all sinks in turn.
+#[derive(Default)]
+pub struct Monitor {
+    sinks: Vec<Box<dyn Sink>>,
+}
+
+impl Monitor {
+    /// The monitor of one rank: log lines and progress on rank 0, nothing elsewhere.
+    pub fn of_rank(rank: usize, mode: Mode) -> Self {
+        if rank > 0 {
+            return Self::default();
+        }
+        // Progress comes first: it clears its line before the log continues.
+        Self { sinks: vec![Box::new(Progress::on_stderr(mode)), Box::new(Plain::default())] }
+    }
+}
+
+impl Sink for Monitor {
+    fn event(&mut self, event: &Event) {
+        for sink in &mut self.sinks {
+            sink.event(event);
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Events as log lines: a block of sizes, one aligned line a Newton step, tables at the end.
+//!
+//! Lines go out through `tracing` at level INFO, warnings at WARN. What the QP solver does inside a step is left to
+//! [`super::progress`].
+
+use super::events::{Event, Sink};
+use super::timing::PhaseTable;
+use crate::results::summary::{NewtonRow, Residuals, Sizes};
+
+/// Writes log lines.
+#[derive(Default)]
+pub struct Plain {
+    newton_header_written: bool,
+}
+
+impl Sink for Plain {
+    fn event(&mut self, event: &Event) {
+        if let Event::Warning(text) = event {
+            tracing::warn!("{text}");
+        }
+        for line in self.lines(event) {
+            tracing::info!("{line}");
+        }
+    }
+}
+
+impl Plain {
+    fn lines(&mut self, event: &Event) -> Vec<String> {
+        match event {
+            Event::Sizes { scene, level, ranks, sizes } => size_lines(scene, *level, *ranks, sizes),
+            Event::NewtonStep(row) => {
+                let header = (!std::mem::replace(&mut self.newton_header_written, true)).then(newton_header);
+                header.into_iter().chain([newton_line(row)]).collect()
+            }
+            Event::Phases(table) => phase_lines(table),
+            Event::Residuals(residuals) => residual_lines(residuals),
+            Event::Outcome { converged, newton_iterations, seconds, note } => {
+                let verdict = if *converged { "Converged" } else { "NOT converged" };
+                vec![format!("{verdict} in {newton_iterations} Newton steps, {seconds:.2} s. {note}").trim_end().into()]
+            }
+            Event::Inner { .. } | Event::Warning(_) => Vec::new(),
+        }
+    }
+}
+
+fn size_lines(scene: &str, level: usize, ranks: usize, sizes: &Sizes) -> Vec<String> {
+    let line = |what: &str, count: u64, detail: String| format!("  {what:<16}{count:>12}{detail}");
+    let (glue, supports, contact) = (sizes.gluing_rows, sizes.dirichlet_rows, sizes.contact_rows);
+    let share = match ranks {
+        1 => "  on 1 rank".to_owned(),
+        _ => format!("  on {ranks} ranks"),
+    };
+    vec![
+        format!("{scene}, level {level}"),
+        line("nodes", sizes.nodes, String::new()),
+        line("elements", sizes.elements, format!("  in {} cells", sizes.cells)),
+        line("subdomains", sizes.subdomains, share),
+        line("primal unknowns", sizes.primal_dofs, String::new()),
+        line("dual unknowns", sizes.dual_dofs, format!("  {glue} gluing + {supports} support + {contact} contact")),
+    ]
+}
+
+fn newton_header() -> String {
+    format!(
+        "{:>4} {:>10} {:>10} {:>8} {:>9} {:>8} {:>6} {:>8} {:>9}",
+        "step", "criterion", "residual", "damping", "plastic", "contact", "QP", "F", "seconds"
+    )
+}
+
+fn newton_line(row: &NewtonRow) -> String {
+    format!(
+        "{:>4} {:>10.3e} {:>10.3e} {:>8.4} {:>9} {:>8} {:>6} {:>8} {:>9.2}",
+        row.step,
+        row.criterion,
+        row.residual,
+        row.damping,
+        row.plastic_elements,
+        row.active_contacts,
+        row.qp_iterations,
+        row.hessian_multiplications,
+        row.seconds
+    )
+}
+
+fn phase_lines(table: &PhaseTable) -> Vec<String> {
+    let header = format!("{:<24} {:>8} {:>10} {:>8} {:>6}", "phase", "calls", "max s", "max/min", "%");
+    let row = |phase: &super::timing::Phase| {
+        let ratio = phase.ratio().map_or("-".into(), |ratio| format!("{ratio:.2}"));
+        let percent = 100.0 * phase.max_seconds / table.total_seconds;
+        format!("{:<24} {:>8} {:>10.3} {ratio:>8} {percent:>6.1}", phase.name, phase.calls, phase.max_seconds)
+    };
+    let total = format!("{:<24} {:>8} {:>10.3} {:>8} {:>6.1}", "total", "", table.total_seconds, "", 100.0);
+    [header].into_iter().chain(table.phases.iter().map(row)).chain([total]).collect()
+}
+
+fn residual_lines(residuals: &Residuals) -> Vec<String> {
+    let rows = [
+        ("equilibrium", residuals.equilibrium),
+        ("gluing", residuals.gluing),
+        ("gap", residuals.gap),
+        ("complementarity", residuals.complementarity),
+    ];
+    let known = rows.into_iter().filter_map(|(name, value)| value.map(|v| format!("  {name:<16}{v:>12.3e}")));
+    ["relative residuals".to_owned()].into_iter().chain(known).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn newton_lines_stand_under_one_header() {
+        let mut plain = Plain::default();
+        let row = NewtonRow {
+            step: 3,
+            criterion: 0.0123456,
+            residual: 4.5e-7,
+            damping: 1.0,
+            plastic_elements: 6813,
+            active_contacts: 70,
+            qp_iterations: 25,
+            hessian_multiplications: 325,
+            seconds: 1.234,
+        };
+        let first = plain.lines(&Event::NewtonStep(row.clone()));
+        assert_eq!(
+            first,
+            [
+                "step  criterion   residual  damping   plastic  contact     QP        F   seconds",
+                "   3   1.235e-2   4.500e-7   1.0000      6813       70     25      325      1.23",
+            ]
+        );
+        assert_eq!(plain.lines(&Event::NewtonStep(row)), first[1..]);
+    }
+
+    #[test]
+    fn absent_residuals_have_no_line() {
+        let residuals = Residuals { equilibrium: Some(2e-9), ..Residuals::default() };
+        let lines = Plain::default().lines(&Event::Residuals(residuals));
+        assert_eq!(lines, ["relative residuals", "  equilibrium         2.000e-9"]);
+    }
+}

@@ -1,0 +1,55 @@
+//! Files that are complete or not there: written under a temporary name in the same directory, then renamed.
+//!
+//! A run that ends half-way leaves the earlier file of that name untouched. Two runs that write the same file at the
+//! same time are not kept apart.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::OutputError;
+use super::agree::on_root;
+use crate::comm::Comm;
+
+/// Lets `fill` write the file under the temporary name it is given; then rank 0 renames it to `path`. Rank 0 creates
+/// missing directories and the empty file first, so that ranks enter `fill` only if there is something to write to.
+/// Collective; `fill` must have the same outcome on every rank.
+///
+/// # Errors
+/// [`OutputError::Write`] on every rank if any step fails; the temporary file is removed then.
+pub fn replace(
+    comm: &dyn Comm,
+    path: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), String>,
+) -> Result<(), OutputError> {
+    let temporary = temporary_name(path);
+    let outcome = on_root(comm, "creating the file", || create(&temporary))
+        .and_then(|()| fill(&temporary))
+        .and_then(|()| on_root(comm, "completing the file", || complete(&temporary, path)));
+    outcome.map_err(|reason| {
+        if comm.rank() == 0 {
+            // Nothing to remove if it could not even be created.
+            let _ = fs::remove_file(&temporary);
+        }
+        OutputError::Write { path: path.to_owned(), reason }
+    })
+}
+
+fn temporary_name(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".partial");
+    path.with_file_name(name)
+}
+
+fn create(temporary: &Path) -> io::Result<()> {
+    if let Some(directory) = temporary.parent() {
+        fs::create_dir_all(directory)?;
+    }
+    File::create(temporary).map(drop)
+}
+
+/// Rename only what has reached the disk: after a power cut there is the old file or the new one.
+fn complete(temporary: &Path, path: &Path) -> io::Result<()> {
+    File::open(temporary)?.sync_all()?;
+    fs::rename(temporary, path)
+}

@@ -1,0 +1,215 @@
+//! One JSON object that sums up a run, for scripts, tables and tests.
+//!
+//! The keys are a contract (more may be added). Quantities that a run does not have (a check solves nothing, a scene
+//! without contact has no gap) are null; so are values that are not finite. All other numbers read back to the same bits.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::OutputError;
+use super::agree::on_root;
+use super::replace::replace;
+use crate::comm::Comm;
+
+/// What a run was about and what came out. Lengths, forces and energies are in the scene's units.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Name of the built-in scene, or the path of its file.
+    pub scene: String,
+    /// The scene's own title.
+    pub title: String,
+    /// Refinement level.
+    pub level: usize,
+    /// Whether Newton's method converged; null if nothing was solved.
+    pub converged: Option<bool>,
+    /// Number of ranks.
+    pub ranks: usize,
+    /// Sizes of the problem.
+    #[serde(flatten)]
+    pub sizes: Sizes,
+    /// Elements with plastic flow in the last step.
+    pub plastic_elements: Option<u64>,
+    /// Their share of all elements, 0 to 1.
+    pub plastic_fraction: Option<f64>,
+    /// Newton steps.
+    pub newton_iterations: Option<u64>,
+    /// QP solver: smalse-m or active-set.
+    pub qp: String,
+    /// Work done by the QP solver.
+    #[serde(flatten)]
+    pub counters: Counters,
+    /// Contact pairs that transmit pressure.
+    pub active_contacts: Option<u64>,
+    /// Force on the slave surfaces.
+    pub contact_force: Option<[f64; 3]>,
+    /// Force of each support on the bodies.
+    pub reactions: BTreeMap<String, [f64; 3]>,
+    /// Work of the loads, `f'u`.
+    pub external_work: Option<f64>,
+    /// `Psi(u)`.
+    pub internal_energy: Option<f64>,
+    /// `J(u) = Psi(u) - f'u`.
+    pub energy: Option<f64>,
+    /// Largest length of a nodal displacement.
+    pub max_displacement: Option<f64>,
+    /// Largest von Mises stress of an element.
+    pub max_von_mises: Option<f64>,
+    /// How well the equations hold.
+    #[serde(flatten)]
+    pub residuals: Residuals,
+    /// Wall time of the run in seconds.
+    pub time_total: Option<f64>,
+    /// Seconds of each phase on the slowest rank.
+    pub time: BTreeMap<String, f64>,
+    /// Sum over the ranks of their largest resident memory, in MiB.
+    pub peak_rss_mb: Option<f64>,
+    /// Why the run failed.
+    pub error: Option<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// One row a Newton step.
+    pub newton: Vec<NewtonRow>,
+}
+
+/// Sizes of the problem, in the paper's way of counting rows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Sizes {
+    /// Nodes of the meshes.
+    pub nodes: u64,
+    /// Hexahedral cells of bricks before they are split into elements; elements of other meshes.
+    pub cells: u64,
+    /// Finite elements.
+    pub elements: u64,
+    /// Subdomains.
+    pub subdomains: u64,
+    /// Displacements of the torn problem.
+    pub primal_dofs: u64,
+    /// All rows.
+    pub dual_dofs: u64,
+    /// Rows that glue subdomains.
+    pub gluing_rows: u64,
+    /// Rows of the supports.
+    pub dirichlet_rows: u64,
+    /// Rows of contact.
+    pub contact_rows: u64,
+}
+
+/// Work done by the QP solver in all Newton steps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Counters {
+    /// Outer iterations of SMALSE-M.
+    pub smalse_iterations: Option<u64>,
+    /// Outer iterations of the active-set method.
+    pub active_set_iterations: Option<u64>,
+    /// Inner iterations of either.
+    pub dual_iterations: Option<u64>,
+    /// Every application of F, the ones for norms and residuals included.
+    pub hessian_multiplications: Option<u64>,
+    /// Applications of the preconditioner.
+    pub preconditioner_applications: Option<u64>,
+    /// Factorisations of subdomain matrices.
+    pub factorisations: Option<u64>,
+}
+
+/// Relative residuals of the glued, undecomposed problem.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Residuals {
+    /// Forces out of balance.
+    #[serde(rename = "residual_equilibrium")]
+    pub equilibrium: Option<f64>,
+    /// Jumps between the copies of a node.
+    #[serde(rename = "residual_gluing")]
+    pub gluing: Option<f64>,
+    /// Penetration.
+    #[serde(rename = "residual_gap")]
+    pub gap: Option<f64>,
+    /// Pressure across open gaps.
+    #[serde(rename = "residual_complementarity")]
+    pub complementarity: Option<f64>,
+}
+
+/// One Newton step.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct NewtonRow {
+    /// Number, from 1.
+    pub step: u64,
+    /// The paper's stopping criterion in the energy norm.
+    pub criterion: f64,
+    /// Relative residual of the equilibrium.
+    pub residual: f64,
+    /// Length of the step taken, 1 is Newton's own.
+    pub damping: f64,
+    /// Elements with plastic flow.
+    pub plastic_elements: u64,
+    /// Contact pairs that transmit pressure.
+    pub active_contacts: u64,
+    /// Outer iterations of the QP solver.
+    pub qp_iterations: u64,
+    /// Applications of F.
+    pub hessian_multiplications: u64,
+    /// Wall time.
+    pub seconds: f64,
+}
+
+impl Summary {
+    /// Rank 0 writes the summary as JSON. Collective.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] on every rank; an earlier file of that name is untouched then.
+    pub fn write(&self, comm: &dyn Comm, path: &Path) -> Result<(), OutputError> {
+        replace(comm, path, |temporary| {
+            on_root(comm, "writing the summary", || {
+                let mut file = BufWriter::new(File::create(temporary)?);
+                serde_json::to_writer_pretty(&mut file, self)?;
+                writeln!(file)?;
+                file.flush()
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+    use serde_json::Value;
+
+    #[test]
+    fn numbers_read_back_bitwise_and_absent_ones_are_null() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("new/summary.json");
+        let summary = Summary {
+            converged: Some(true),
+            energy: Some(-1245323411.382042),
+            max_displacement: Some(0.1 + 0.2),
+            residuals: Residuals { equilibrium: Some(f64::NAN), gluing: Some(5e-324), ..Residuals::default() },
+            reactions: BTreeMap::from([("left".into(), [1.0 / 3.0, -0.0, 1e300])]),
+            ..Summary::default()
+        };
+        threads::run(3, |comm| summary.write(comm, &path).unwrap());
+        let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(read["energy"].as_f64(), summary.energy);
+        assert_eq!(read["max_displacement"].as_f64(), Some(0.1 + 0.2));
+        assert_eq!(read["residual_gluing"].as_f64(), Some(5e-324));
+        assert_eq!(read["reactions"]["left"][0].as_f64(), Some(1.0 / 3.0));
+        for key in ["residual_equilibrium", "residual_gap", "smalse_iterations", "error", "contact_force"] {
+            assert_eq!(read.get(key), Some(&Value::Null), "{key}");
+        }
+        assert_eq!(read["dual_dofs"], 0);
+    }
+
+    #[test]
+    fn an_impossible_place_is_everybodys_error() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("file");
+        std::fs::write(&file, "kept").unwrap();
+        let outcomes = threads::run(3, |comm| Summary::default().write(comm, &file.join("summary.json")));
+        assert!(matches!(&outcomes[0], Err(OutputError::Write { reason, .. }) if reason.contains("rank 0")));
+        assert!(outcomes.iter().all(|o| *o == outcomes[0]));
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+    }
+}

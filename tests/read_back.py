@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""Reads a result file back with h5py and with VTK, independently of the program that wrote it.
+
+    tests/read_back.py RESULT.vtkhdf
+
+Prints what was checked; exit code 0 if all of it holds. Needs h5py, numpy and vtk.
+"""
+
+import sys
+
+import h5py
+import numpy as np
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkPartitionedDataSet
+from vtkmodules.vtkIOHDF import vtkHDFReader
+
+NODES_OF_TYPE = {10: 4, 12: 8}
+
+
+def check_hdf5(path):
+    """Groups, lengths and values as the format wants them; returns what VTK should find again."""
+    with h5py.File(path) as file:
+        assert {"VTKHDF", "provenance", "convergence"} <= set(file), f"groups: {list(file)}"
+        grid = file["VTKHDF"]
+        assert grid.attrs["Type"] == b"UnstructuredGrid", grid.attrs["Type"]
+        assert tuple(grid.attrs["Version"]) == (2, 2), grid.attrs["Version"]
+        points, cells, entries = (
+            grid[name][:] for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds")
+        )
+        pieces = len(points)
+        assert len(cells) == len(entries) == pieces
+        assert grid["Points"].shape == (points.sum(), 3)
+        assert grid["Types"].shape == (cells.sum(),)
+        assert grid["Connectivity"].shape == (entries.sum(),)
+        assert grid["Offsets"].shape == (cells.sum() + pieces,)
+        check_pieces(grid, points, cells, entries)
+        for group, rows in (("PointData", points.sum()), ("CellData", cells.sum())):
+            for name, field in grid[group].items():
+                assert len(field) == rows, f"{name}: {len(field)} rows for {rows}"
+                assert np.isfinite(field[:]).all(), f"{name} has values that are not finite"
+        assert grid["PointData/displacement"].shape == (points.sum(), 3)
+        columns = {len(column) for column in file["convergence"].values()}
+        assert len(columns) <= 1, f"columns of different lengths: {columns}"
+        provenance = {name: text[()].decode() for name, text in file["provenance"].items()}
+        fields = {
+            group: {name: field[:] for name, field in grid[group].items()} for group in ("PointData", "CellData")
+        }
+        print(f"h5py: {pieces} pieces, {points.sum()} points, {cells.sum()} cells, all fields finite")
+        print(f"      empty pieces: {int((cells == 0).sum())}; fields: {[*fields['PointData'], *fields['CellData']]}")
+        print(f"      provenance: {len(provenance)} texts; convergence: {list(file['convergence'])}")
+        return grid["Points"][:], cells.sum(), fields
+
+
+def check_pieces(grid, points, cells, entries):
+    """Every piece numbers its own points, and its offsets begin at 0 and end at its number of entries."""
+    first_offset = first_cell = first_entry = 0
+    for piece, (n_points, n_cells, n_entries) in enumerate(zip(points, cells, entries)):
+        offsets = grid["Offsets"][first_offset : first_offset + n_cells + 1]
+        types = grid["Types"][first_cell : first_cell + n_cells]
+        connectivity = grid["Connectivity"][first_entry : first_entry + n_entries]
+        assert offsets[0] == 0 and offsets[-1] == n_entries, f"piece {piece}: offsets {offsets[0]}..{offsets[-1]}"
+        expected = [NODES_OF_TYPE[kind] for kind in types]
+        assert (np.diff(offsets) == expected).all(), f"piece {piece}: nodes a cell do not fit the types"
+        if n_entries:
+            assert 0 <= connectivity.min() and connectivity.max() < n_points, f"piece {piece}: point out of range"
+        first_offset, first_cell, first_entry = first_offset + n_cells + 1, first_cell + n_cells, first_entry + n_entries
+
+
+def check_vtk(path, points, cells, fields):
+    """VTK finds the same points and values, in the same order."""
+    reader = vtkHDFReader()
+    assert reader.CanReadFile(path), "VTK does not take it for a VTKHDF file"
+    reader.SetFileName(path)
+    reader.Update()
+    data = reader.GetOutputDataObject(0)
+    if isinstance(data, vtkPartitionedDataSet):
+        blocks = [data.GetPartition(i) for i in range(data.GetNumberOfPartitions())]
+    else:
+        blocks = [data]
+    blocks = [block for block in blocks if block is not None and block.GetNumberOfPoints()]
+    assert sum(block.GetNumberOfCells() for block in blocks) == cells
+    assert (np.concatenate([vtk_to_numpy(b.GetPoints().GetData()) for b in blocks]) == points).all()
+    for group, of in (("PointData", "GetPointData"), ("CellData", "GetCellData")):
+        for name, values in fields[group].items():
+            read = np.concatenate([vtk_to_numpy(getattr(b, of)().GetArray(name)) for b in blocks])
+            assert (read == values).all(), f"{name} differs"
+    print(f"VTK:  {data.GetClassName()}, {len(blocks)} blocks with points, {cells} cells, every value equal")
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    check_vtk(sys.argv[1], *check_hdf5(sys.argv[1]))
+
+
+if __name__ == "__main__":
+    main()
