@@ -17,7 +17,7 @@ use crate::feti::projector::Projector;
 use crate::feti::space::RowSpace;
 use crate::material::Material;
 use crate::mesh::{Brick, Face};
-use crate::monitor::Monitor;
+use crate::monitor::timing::Timer;
 use crate::newton::{self, Settings, Solution, StepSettings, StepSolver, TornProblem};
 use crate::qp::mprgp::Expansion;
 use crate::scene::{self, Scene, SurfaceName};
@@ -116,16 +116,14 @@ fn material(m: &scene::Material) -> Material {
 ///
 /// # Errors
 /// If the constraints leave a rigid motion free: on every rank.
-pub fn solve(scene: &Scene, discrete: &Discrete, comm: &dyn Comm, monitor: &mut Monitor) -> Result<Solution, StudyError> {
+pub fn solve(scene: &Scene, discrete: &Discrete, comm: &dyn Comm, timer: &Timer) -> Result<Solution, StudyError> {
     let Discrete { decomposition, constraints, .. } = discrete;
     let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains[..]);
     let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
     let space = RowSpace::new(comm, shares, constraints);
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
-    let coarse = monitor
-        .timer
-        .time("coarse setup", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
-    let factors = monitor.timer.time("symbolic analysis", || Factors::new(analyse(subdomains)));
+    let coarse = timer.time("coarse setup", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
+    let factors = timer.time("symbolic analysis", || Factors::new(analyse(subdomains)));
     let mut loads = gather.zeros();
     for (subdomain, f) in subdomains.iter().zip(&mut loads) {
         loads::add_tractions(subdomain, &discrete.tractions, f);
@@ -152,7 +150,7 @@ pub fn solve(scene: &Scene, discrete: &Discrete, comm: &dyn Comm, monitor: &mut 
     let settings =
         Settings { tolerance: solver.newton_tolerance, residual: solver.residual_tolerance, limit: solver.newton_limit };
     let mut steps = StepSolver::new(DualOperator::new(factors, &gather), Projector { coarse }, step, subdomains.len());
-    Ok(newton::solve(&problem, &mut steps, &settings, monitor))
+    Ok(newton::solve(&problem, &mut steps, &settings, timer, &mut |r| println!("{r:?}")))
 }
 
 /// Numbers of gluing, support and contact rows over all ranks. Collective.

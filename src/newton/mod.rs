@@ -15,8 +15,7 @@ pub use residuals::Residuals;
 pub use step::{StepSettings, StepSolver};
 
 use crate::feti::Torn;
-use crate::monitor::events::{Event, NewtonStep};
-use crate::monitor::Monitor;
+use crate::monitor::timing::Timer;
 use crate::qp;
 
 /// When to stop.
@@ -67,6 +66,33 @@ impl Outcome {
     }
 }
 
+/// What one step did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepRecord {
+    /// Number, from 1.
+    pub number: usize,
+    /// The paper's criterion.
+    pub criterion: f64,
+    /// Largest of the true residuals.
+    pub residual: f64,
+    /// Step length, 1 for a full step.
+    pub damping: f64,
+    /// `J` after the step.
+    pub energy: f64,
+    /// Elements that yield.
+    pub plastic_elements: usize,
+    /// Contact pairs with a force.
+    pub active_contacts: usize,
+    /// What the QP solver did.
+    pub statistics: qp::Statistics,
+    /// Applications of F, those around the quadratic program included.
+    pub applications: usize,
+    /// Factorisations over all ranks.
+    pub factorisations: usize,
+    /// Wall time.
+    pub seconds: f64,
+}
+
 /// The solution and what it took.
 pub struct Solution {
     /// Torn displacement; copies agree and the bodies do not overlap, to round-off.
@@ -76,11 +102,9 @@ pub struct Solution {
     /// How the iteration ended.
     pub outcome: Outcome,
     /// One record a step.
-    pub steps: Vec<NewtonStep>,
+    pub steps: Vec<StepRecord>,
     /// Residuals of the glued problem at `u`.
     pub residuals: Residuals,
-    /// Sum over the steps.
-    pub statistics: qp::Statistics,
     /// `J(u)`.
     pub energy: f64,
     /// `Psi(u)`.
@@ -91,27 +115,31 @@ pub struct Solution {
     pub plastic_elements: usize,
 }
 
-/// Solves from rest. Collective.
-pub fn solve(problem: &TornProblem, solver: &mut StepSolver, settings: &Settings, monitor: &mut Monitor) -> Solution {
+/// Solves from rest; `report` is told of every step. Collective.
+pub fn solve(
+    problem: &TornProblem,
+    solver: &mut StepSolver,
+    settings: &Settings,
+    timer: &Timer,
+    report: &mut dyn FnMut(&StepRecord),
+) -> Solution {
     let mut u = problem.gather.zeros();
     let mut state = problem.evaluate(&u);
     let mut lambda = vec![0.0; problem.gather.rows()];
     let mut residuals = problem.residuals(&u, &state, &lambda);
-    let mut statistics = qp::Statistics::default();
     let mut steps = Vec::new();
     let mut admissible = problem.is_admissible(&u);
     let outcome = loop {
-        let watch = monitor.timer.seconds();
-        let step = match solver.solve(problem, &u, &state, &monitor.timer) {
+        let watch = timer.total_seconds();
+        let step = match solver.solve(problem, &u, &state, timer) {
             Ok(step) => step,
             Err(message) => break Outcome::Singular(message),
         };
-        statistics += step.statistics;
         if !matches!(step.outcome, qp::Outcome::Converged | qp::Outcome::LimitReached) {
             break if step.outcome == qp::Outcome::NotFinite { Outcome::NotFinite } else { Outcome::Inner(step.outcome) };
         }
         // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
-        let Some(damped) = damping::search(problem, &u, &state, &step.du, admissible, &monitor.timer) else {
+        let Some(damped) = damping::search(problem, &u, &state, &step.du, admissible, timer) else {
             break if state.energy.is_finite() { Outcome::Stalled } else { Outcome::NotFinite };
         };
         let criterion = problem.relative_change(&u, &damped.u);
@@ -119,22 +147,21 @@ pub fn solve(problem: &TornProblem, solver: &mut StepSolver, settings: &Settings
         state = damped.state;
         lambda = step.lambda;
         admissible = true;
-        residuals = monitor.timer.time("residuals", || problem.residuals(&u, &state, &lambda));
-        let record = NewtonStep {
-            step: steps.len() + 1,
+        residuals = timer.time("residuals", || problem.residuals(&u, &state, &lambda));
+        let record = StepRecord {
+            number: steps.len() + 1,
             criterion,
             residual: residuals.largest(),
             damping: damped.length,
             energy: state.energy,
             plastic_elements: state.plastic,
             active_contacts: problem.active_contacts(&lambda),
-            qp_outer: step.statistics.outer,
-            qp_iterations: step.statistics.cg + step.statistics.expansions + step.statistics.proportionings,
-            hessian_multiplications: step.applications,
+            statistics: step.statistics,
+            applications: step.applications,
             factorisations: step.factorisations,
-            seconds: monitor.timer.seconds() - watch,
+            seconds: timer.total_seconds() - watch,
         };
-        monitor.event(&Event::NewtonStep(record.clone()));
+        report(&record);
         steps.push(record);
         if !(criterion.is_finite() && state.energy.is_finite()) {
             break Outcome::NotFinite;
@@ -156,7 +183,6 @@ pub fn solve(problem: &TornProblem, solver: &mut StepSolver, settings: &Settings
         outcome,
         steps,
         residuals,
-        statistics,
         energy: state.energy,
         internal_energy: state.internal_energy,
         external_work: state.external_work,
