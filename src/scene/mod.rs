@@ -26,17 +26,15 @@ use serde::{Deserialize, Serialize};
 pub use body::{Axis, Body, Brick, Element};
 pub use decomposition::Decomposition;
 pub use error::{Fault, Place, SceneError};
-pub use held::Motion;
 pub use material::Material;
 pub use solver::{Expansion, Preconditioner, Qp, Solver};
-pub use surface::{Contact, Face, Load, Support, SurfaceName};
+pub use surface::{Contact, Face, Load, Support, SurfaceError, SurfaceName};
 
 /// A study: bodies, what holds and loads them, where they touch, how to cut and how to solve.
 ///
 /// Names are the user's; the maps are ordered by name, which is the order of bodies everywhere else.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-#[derive(Default)]
 pub struct Scene {
     /// One line for headings.
     pub title: String,
