@@ -1,6 +1,6 @@
 //! The scene: everything a user says about a study, as plain data read from TOML.
 //!
-//! Reading goes: text -> value tree -> `--set` overrides -> typed [`Scene`] -> refinement by level -> [checks](check).
+//! Reading goes: text -> value tree -> `--set` overrides -> typed [`Scene`] -> refinement by level -> checks.
 //! What leaves [`Scene::load`] is consistent, so later stages need not ask again whether a body exists or a modulus is
 //! positive. Numbers carry no units: any consistent system does, and `units` is only echoed.
 //!
