@@ -5,14 +5,14 @@
 
 use std::fmt::Debug;
 
+use super::Scene;
 use super::body::{Axis, Body, Brick};
 use super::decomposition::Decomposition;
 use super::error::Fault;
 use super::held;
 use super::material::Material;
 use super::solver::Solver;
-use super::surface::{Contact, Support, SurfaceName};
-use super::{Scene, surface::Load};
+use super::surface::{Contact, Load, Support, SurfaceName};
 
 type Checked = Result<(), Fault>;
 

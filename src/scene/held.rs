@@ -17,7 +17,7 @@ use super::surface::{Face, Support};
 
 /// A rigid motion in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub(super) enum Motion {
     /// Along an axis.
     Translation(Axis),
     /// About some line parallel to an axis.

@@ -1,6 +1,6 @@
 //! The scene: everything a user says about a study, as plain data read from TOML.
 //!
-//! Reading goes: text -> value tree -> `--set` overrides -> typed [`Scene`] -> refinement by level -> [checks](check).
+//! Reading goes: text -> value tree -> `--set` overrides -> typed [`Scene`] -> refinement by level -> checks.
 //! What leaves [`Scene::load`] is consistent, so later stages need not ask again whether a body exists or a modulus is
 //! positive. Numbers carry no units: any consistent system does, and `units` is only echoed.
 //!
@@ -26,17 +26,15 @@ use serde::{Deserialize, Serialize};
 pub use body::{Axis, Body, Brick, Element};
 pub use decomposition::Decomposition;
 pub use error::{Fault, Place, SceneError};
-pub use held::Motion;
 pub use material::Material;
 pub use solver::{Expansion, Preconditioner, Qp, Solver};
-pub use surface::{Contact, Face, Load, Support, SurfaceName};
+pub use surface::{Contact, Face, Load, Support, SurfaceError, SurfaceName};
 
 /// A study: bodies, what holds and loads them, where they touch, how to cut and how to solve.
 ///
 /// Names are the user's; the maps are ordered by name, which is the order of bodies everywhere else.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-#[derive(Default)]
 pub struct Scene {
     /// One line for headings.
     pub title: String,

@@ -6,6 +6,7 @@
 
 use toml::{Table, Value};
 
+use super::read::in_user_words;
 use super::{Scene, SceneError};
 
 /// Sections whose entries have names of the user's choice.
@@ -33,7 +34,7 @@ pub(super) fn blame(tree: &Table, sets: &[String], error: &toml::de::Error) -> S
         matches!(changed, Some(Err(alone)) if alone.message() == error.message())
     });
     // Without a text, toml's own message ends in a line "in `section`", which is wanted here.
-    let problem = error.to_string().trim_end().replace('\n', ", ");
+    let problem = in_user_words(&error.to_string());
     match culprit {
         Some(set) => refused(set, new_entry(tree, set, &problem).unwrap_or(problem)),
         None => refused(&sets.join(" --set "), problem),
@@ -81,7 +82,7 @@ fn parse_value(value: &str) -> Result<Value, String> {
         Ok(mut table) if table.len() == 1 => Ok(table.remove("value").expect("the key just written")),
         _ if value.starts_with(char::is_alphabetic) => Ok(Value::String(value.to_owned())),
         Ok(_) => Err("give one value".to_owned()),
-        Err(error) => Err(format!("`{value}` is not a TOML value: {}", error.message().replace('\n', ", "))),
+        Err(error) => Err(format!("`{value}` is not a TOML value: {}", in_user_words(error.message()))),
     }
 }
 
@@ -127,9 +128,13 @@ fn new_entry(tree: &Table, set: &str, problem: &str) -> Option<String> {
     let path = parse(set).ok()?.path;
     let [section, name, _, ..] = path.as_slice() else { return None };
     let known = tree.get(section).and_then(Value::as_table);
-    if !NAMED.contains(&section.as_str()) || known.is_some_and(|known| known.contains_key(name)) {
+    let incomplete = NAMED.contains(&section.as_str()) && problem.starts_with("missing key");
+    if !incomplete || known.is_some_and(|known| known.contains_key(name)) {
         return None;
     }
-    let known = known.map(|known| known.keys().cloned().collect::<Vec<_>>().join(", ")).unwrap_or_default();
-    Some(format!("unknown key `{section}.{name}`: [{section}] has {known}; a new entry needs all its keys ({problem})"))
+    let known = match known.filter(|known| !known.is_empty()) {
+        Some(known) => format!("has {}", known.keys().map(String::as_str).collect::<Vec<_>>().join(", ")),
+        None => "is empty".to_owned(),
+    };
+    Some(format!("unknown key `{section}.{name}`: [{section}] {known}; a new entry needs all its keys ({problem})"))
 }

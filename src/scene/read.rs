@@ -12,7 +12,7 @@ use super::{Scene, overrides};
 pub(super) fn scene(text: &str, origin: &str, sets: &[String]) -> Result<Scene, SceneError> {
     let syntax = |error: toml::de::Error| SceneError::Syntax {
         place: Place::Text { origin: origin.to_owned(), position: error.span().map(|span| line_column(text, span)) },
-        message: error.message().replace('\n', ", "),
+        message: in_user_words(error.message()),
     };
     // A value tree knows no places, so the text is also read directly: its own errors are reported with theirs.
     let unchanged = toml::from_str::<Scene>(text);
@@ -25,6 +25,18 @@ pub(super) fn scene(text: &str, origin: &str, sets: &[String]) -> Result<Scene, 
         Err(own) => syntax(own),
         Ok(_) => overrides::blame(&tree, sets, &error),
     })
+}
+
+/// A message of the TOML reader on one line, without the vocabulary of Rust types.
+pub(super) fn in_user_words(message: &str) -> String {
+    let words = [
+        ("unknown field", "unknown key"),
+        ("missing field", "missing key"),
+        ("expected usize", "expected a count (0, 1, 2, ...)"),
+        ("expected f64", "expected a number"),
+        ("\n", ", "),
+    ];
+    words.iter().fold(message.trim_end().to_owned(), |text, (from, to)| text.replace(from, to))
 }
 
 /// Where a dotted key got its value: an override, or the nearest line of the text.

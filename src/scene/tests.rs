@@ -127,13 +127,13 @@ fn files_are_read() {
 #[test]
 fn syntax_and_type_errors_have_a_place() {
     refuses_text("poisson = 0.3", "poisson = ", &["one.toml, line 5, column 1"]);
-    refuses_text("poisson = 0.3", "poisson = \"a\"", &["one.toml, line 5, column 11", "expected f64"]);
-    refuses_text("poisson = 0.3", "poison = 0.3", &["line 5, column 1", "unknown field `poison`", "poisson"]);
-    refuses_text("poisson = 0.3", "", &["line 3", "missing field `poisson`"]);
+    refuses_text("poisson = 0.3", "poisson = \"a\"", &["one.toml, line 5, column 11", "expected a number"]);
+    refuses_text("poisson = 0.3", "poison = 0.3", &["line 5, column 1", "unknown key `poison`", "poisson"]);
+    refuses_text("poisson = 0.3", "", &["line 3", "missing key `poisson`"]);
     refuses_text("tet4", "hex27", &["line 8", "hex27", "tet4"]);
-    refuses_text("[support.base]", "[suport.base]", &["line 10", "unknown field `suport`"]);
+    refuses_text("[support.base]", "[suport.base]", &["line 10", "unknown key `suport`"]);
     refuses_text("[2, 2, 2] }", "[2, 2] }", &["line 9", "3"]);
-    refuses_text("[2, 2, 2] }", "[2, 2, -2] }", &["line 9", "-2"]);
+    refuses_text("[2, 2, 2] }", "[2, 2, -2] }", &["line 9", "-2", "expected a count"]);
 }
 
 #[test]
@@ -353,17 +353,18 @@ fn overrides_may_complete_a_file() {
 
 #[test]
 fn overrides_that_do_not_fit_are_named() {
-    refuses(&["title=a", "solver.newton_tol=1e-3"], &["--set solver.newton_tol=1e-3: ", "unknown field `newton_tol`"]);
-    refuses(&["solvr.qp=smalse-m"], &["--set solvr.qp=smalse-m", "unknown field `solvr`"]);
+    refuses(&["title=a", "solver.newton_tol=1e-3"], &["--set solver.newton_tol=1e-3: ", "unknown key `newton_tol`"]);
+    refuses(&["solvr.qp=smalse-m"], &["--set solvr.qp=smalse-m", "unknown key `solvr`"]);
     refuses(
         &["body.blok.brick.size=[1, 1, 1]"],
-        &["--set body.blok.brick.size=[1, 1, 1]: unknown key `body.blok`: [body] has block", "missing field"],
+        &["--set body.blok.brick.size=[1, 1, 1]: unknown key `body.blok`: [body] has block", "missing key"],
     );
     refuses(&["solver.qp_limit=many"], &["solver.qp_limit=many", "invalid type", "in `solver.qp_limit`"]);
     refuses(
         &["load.a.surface=block.xmin", "load.a.tractoin=[0, 0, 1]"],
-        &["load.a.tractoin", "unknown field `tractoin`"],
+        &["load.a.tractoin", ": unknown key `tractoin`"],
     );
+    refuses(&["load.a.surface=block.xmin"], &["unknown key `load.a`: [load] is empty; a new entry", "`traction`"]);
     refuses(&["title"], &["--set title: write dotted.path=value"]);
     refuses(&["a b=1"], &["`a b` is not a dotted path"]);
     refuses(&["=1"], &["not a dotted path"]);
