@@ -11,8 +11,10 @@ use crate::decomposition::{self, BodyMesh, Cut, Decomposition, Surface};
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::gather::Gather;
+use crate::feti::interior::{self, InteriorFactors};
 use crate::feti::kernel::RigidModes;
 use crate::feti::operator::DualOperator;
+use crate::feti::preconditioner::{self, Preconditioner};
 use crate::feti::projector::Projector;
 use crate::feti::space::RowSpace;
 use crate::material::Material;
@@ -123,7 +125,18 @@ pub fn solve(scene: &Scene, discrete: &Discrete, comm: &dyn Comm, timer: &Timer)
     let space = RowSpace::new(comm, shares, constraints);
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
     let coarse = timer.time("coarse setup", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
-    let factors = timer.time("symbolic analysis", || Factors::new(analyse(subdomains)));
+    let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
+    let interior = || {
+        let boundaries = preconditioner::boundaries(&gather, subdomains.len());
+        InteriorFactors::new(interior::analyse(&symbolic, boundaries))
+    };
+    let interior = match scene.solver.preconditioner {
+        scene::Preconditioner::None => None,
+        scene::Preconditioner::Lumped => Some(None),
+        scene::Preconditioner::Dirichlet => Some(Some(timer.time("symbolic analysis", interior))),
+    };
+    let preconditioner = interior.map(|interior| Preconditioner::new(&gather, interior));
+    let factors = Factors::new(symbolic);
     let mut loads = gather.zeros();
     for (subdomain, f) in subdomains.iter().zip(&mut loads) {
         loads::add_tractions(subdomain, &discrete.tractions, f);
@@ -149,7 +162,7 @@ pub fn solve(scene: &Scene, discrete: &Discrete, comm: &dyn Comm, timer: &Timer)
     };
     let settings =
         Settings { tolerance: solver.newton_tolerance, residual: solver.residual_tolerance, limit: solver.newton_limit };
-    let mut steps = StepSolver::new(DualOperator::new(factors, &gather), Projector { coarse }, step, subdomains.len());
+    let mut steps = StepSolver::new(DualOperator::new(factors, &gather), Projector { coarse }, preconditioner, step, subdomains.len());
     Ok(newton::solve(&problem, &mut steps, &settings, timer, &mut |r| println!("{r:?}")))
 }
 

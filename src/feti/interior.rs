@@ -14,6 +14,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Par, Side, Spec};
 
 use super::factor::{NotDefinite, Symbolic};
+use crate::assembly::pattern::Pattern;
 
 /// Which unknowns are interior, and the analysis of their block.
 pub struct InteriorSymbolic {
@@ -131,14 +132,20 @@ impl InteriorFactors {
             .map_err(|_| NotDefinite { subdomain, pivot: 0, dofs: n })
     }
 
-    /// `x = K_ii^-1 x` for one own subdomain.
-    pub fn solve(&mut self, own: usize, x: &mut [f64]) {
-        let n = x.len();
-        LltRef::new(&self.symbolic[own].cholesky, &self.values[own]).solve_in_place_with_conj(
+    /// Replaces the interior part of `u`, zero on entry, by the one that is in equilibrium with its boundary part:
+    /// `u_i = -K_ii^-1 K_ib u_b`. `values` are the lower values of the stiffness that was factorised.
+    pub fn extend(&mut self, own: usize, pattern: &Pattern, values: &[f64], u: &mut [f64]) {
+        let InteriorSymbolic { interior, cholesky, .. } = &*self.symbolic[own];
+        let mut forces = vec![0.0; u.len()];
+        pattern.multiply_add(values, u, &mut forces);
+        let mut inside: Vec<f64> = interior.iter().map(|&dof| -forces[dof as usize]).collect();
+        let n = inside.len();
+        LltRef::new(cholesky, &self.values[own]).solve_in_place_with_conj(
             Conj::No,
-            MatMut::from_column_major_slice_mut(x, n, 1),
+            MatMut::from_column_major_slice_mut(&mut inside, n, 1),
             Par::Seq,
             MemStack::new(&mut self.scratch),
         );
+        interior.iter().zip(&inside).for_each(|(&dof, x)| u[dof as usize] = *x);
     }
 }

@@ -35,10 +35,10 @@ pub fn boundaries(gather: &Gather, own: usize) -> Vec<Vec<u32>> {
 
 impl<'a> Preconditioner<'a> {
     /// Dirichlet with interior factors, lumped without.
-    pub fn new(gather: &'a Gather<'a>, interior: Option<InteriorFactors>, scaling: Scaling) -> Self {
+    pub fn new(gather: &'a Gather<'a>, interior: Option<InteriorFactors>) -> Self {
         let torn = gather.zeros();
         let boundary = boundaries(gather, torn.len());
-        Self { gather, interior, scaling, boundary, rows: vec![0.0; gather.rows()], torn, applications: 0 }
+        Self { gather, interior, scaling: Scaling::default(), boundary, rows: vec![0.0; gather.rows()], torn, applications: 0 }
     }
 
     /// `y = B_D S B_D' x`, `stiffness(own)` being the sparsity and the lower values. One neighbour exchange.
@@ -52,16 +52,10 @@ impl<'a> Preconditioner<'a> {
             self.gather.add_transpose_one(own, 1.0, &self.rows, &mut t);
             t.iter_mut().zip(flexibility).for_each(|(t, f)| *t *= f);
             let mut forces = vec![0.0; t.len()];
-            pattern.multiply_add(values, &t, &mut forces);
             if let Some(factors) = &mut self.interior {
-                let interior = &factors.symbolic(own).interior;
-                let mut inside: Vec<f64> = interior.iter().map(|&dof| forces[dof as usize]).collect();
-                let interior = interior.clone();
-                factors.solve(own, &mut inside);
-                let mut correction = vec![0.0; t.len()];
-                interior.iter().zip(&inside).for_each(|(&dof, x)| correction[dof as usize] = -x);
-                pattern.multiply_add(values, &correction, &mut forces);
+                factors.extend(own, pattern, values, &mut t);
             }
+            pattern.multiply_add(values, &t, &mut forces);
             let out = &mut self.torn[own];
             out.fill(0.0);
             for &dof in &self.boundary[own] {
@@ -70,6 +64,22 @@ impl<'a> Preconditioner<'a> {
         }
         self.gather.apply(&self.torn, &mut self.rows);
         self.scaling.solve(&self.rows, y);
+    }
+
+    /// Adds to a torn displacement what closes the rows' `defect = c - B u`: `B_D' defect` on the boundary and, with
+    /// interior factors, the interior that follows it without force. Local.
+    pub fn mend<'k>(&mut self, stiffness: impl Fn(usize) -> (&'k Pattern, &'k [f64]), defect: &[f64], u: &mut Torn) {
+        self.scaling.solve(defect, &mut self.rows);
+        for (own, u) in u.iter_mut().enumerate() {
+            let (pattern, values) = stiffness(own);
+            let mut t = vec![0.0; u.len()];
+            self.gather.add_transpose_one(own, 1.0, &self.rows, &mut t);
+            t.iter_mut().zip(&self.scaling.flexibility[own]).for_each(|(t, f)| *t *= f);
+            if let Some(factors) = &mut self.interior {
+                factors.extend(own, pattern, values, &mut t);
+            }
+            u.iter_mut().zip(&t).for_each(|(u, t)| *u += t);
+        }
     }
 
     /// Applications so far.

@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::gather::Gather;
 use crate::constraint::Constraints;
 
+#[derive(Default)]
 /// `D^-1` of own subdomains and the inverses of the blocks of `B D^-1 B'`.
 pub struct Scaling {
     /// Inverse diagonal of each own subdomain.

@@ -4,18 +4,22 @@
 //! It is shifted by the last step's multipliers `l0`, corrected so that `G l0 = e`: what is left is homogeneous, starts at
 //! zero and its right-hand side `B K^+ (f_k - B'l0) - c_k` costs one application of F.
 
-use super::dual::{Balanced, Flexibility, Multipliers};
+use super::dual::{Dual, Multipliers};
 use super::problem::{State, TornProblem};
 use super::recover;
 use crate::assembly::stiffness;
 use crate::feti::Torn;
+use crate::feti::factor::NotDefinite;
 use crate::feti::operator::DualOperator;
+use crate::feti::preconditioner::Preconditioner;
 use crate::feti::projector::Projector;
+use crate::feti::scaling::Scaling;
 use crate::monitor::timing::Timer;
 use crate::qp::bounds::Bounds;
 use crate::qp::mprgp::Expansion;
 use crate::qp::quadratic::{Projection, Space};
-use crate::qp::{Limits, Outcome, Statistics, pcpg, power, smalse};
+use crate::qp::pcpg::Pcpg;
+use crate::qp::{Limits, Outcome, Statistics, power, smalse};
 
 /// How to solve the quadratic programs.
 #[derive(Clone, Copy, Debug)]
@@ -48,26 +52,28 @@ pub struct Step {
 pub struct StepSolver<'a> {
     operator: DualOperator<'a>,
     projector: Projector<'a>,
+    preconditioner: Option<Preconditioner<'a>>,
     settings: StepSettings,
-    /// Lower values of each own subdomain's tangent, and how many of its elements yield (none before the first step).
-    tangents: Vec<(Vec<f64>, Option<usize>)>,
+    /// Lower values of each own subdomain's tangent.
+    tangents: Vec<Vec<f64>>,
+    /// How many elements of each own subdomain yield; none before the first step.
+    yielding: Vec<Option<usize>>,
     lambda: Option<Vec<f64>>,
     reference: Option<f64>,
- norm: Option<f64>,
+    norm: Option<f64>,
 }
 
 impl<'a> StepSolver<'a> {
     /// On factors and a projector set up for the problem's subdomains.
-    pub fn new(operator: DualOperator<'a>, projector: Projector<'a>, settings: StepSettings, own: usize) -> Self {
-        Self {
-            operator,
-            projector,
-            settings,
-            tangents: vec![(Vec::new(), None); own],
-            lambda: None,
-            reference: None,
- norm: None,
-        }
+    pub fn new(
+        operator: DualOperator<'a>,
+        projector: Projector<'a>,
+        preconditioner: Option<Preconditioner<'a>>,
+        settings: StepSettings,
+        own: usize,
+    ) -> Self {
+        let (tangents, yielding) = (vec![Vec::new(); own], vec![None; own]);
+        Self { operator, projector, preconditioner, settings, tangents, yielding, lambda: None, reference: None, norm: None }
     }
 
     /// Solves for the step at `u`. Collective.
@@ -90,15 +96,14 @@ impl<'a> StepSolver<'a> {
         timer.time("dual operator", || self.operator.respond(&start, &mut torn, &mut b));
         b.iter_mut().zip(&slack).for_each(|(b, s)| *b -= s);
 
-        let (x, outcome, statistics) = self.solve_dual(problem, &start, &b, timer);
+        let (mut x, outcome, statistics) = self.solve_dual(problem, &start, &b, timer);
         let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
 
-        let mut balanced = x;
-        Balanced(&mut self.projector, timer).project(&mut balanced);
-        balanced.iter_mut().zip(&start).for_each(|(x, s)| *x += s);
+        timer.time("coarse problem", || self.projector.project(&mut x));
+        x.iter_mut().zip(&start).for_each(|(x, s)| *x += s);
         let mut du = forces;
         let mut defect = vec![0.0; rows];
-        timer.time("dual operator", || self.operator.respond(&balanced, &mut du, &mut defect));
+        timer.time("dual operator", || self.operator.respond(&x, &mut du, &mut defect));
         defect.iter_mut().zip(&slack).for_each(|(d, s)| *d = s - *d);
         let kept: Vec<bool> =
             problem.constraints.rows.iter().zip(&lambda).map(|(row, &l)| !row.is_inequality() || l > 0.0).collect();
@@ -107,9 +112,23 @@ impl<'a> StepSolver<'a> {
                 recover::add_rigid_motion(problem, &self.projector.coarse, &kept, &defect, &mut du)
             })
             .map_err(|floating| floating.to_string())?;
+        self.mend(problem, &slack, &mut du, timer);
         self.lambda = Some(lambda.clone());
         let applications = self.operator.applications() - before;
         Ok(Step { du, lambda, outcome, statistics, applications, factorisations })
+    }
+
+    /// Closes what the dual solver's tolerance left open, at the least cost in energy that the preconditioner knows.
+    fn mend(&mut self, problem: &TornProblem, slack: &[f64], du: &mut Torn, timer: &Timer) {
+        let Some(preconditioner) = &mut self.preconditioner else { return };
+        let mut defect = vec![0.0; slack.len()];
+        problem.gather.apply(du, &mut defect);
+        for ((d, s), row) in defect.iter_mut().zip(slack).zip(&problem.constraints.rows) {
+            *d = if row.is_inequality() { (s - *d).min(0.0) } else { s - *d };
+        }
+        let factors = &self.operator.factors;
+        let stiffness = |own: usize| (&factors.symbolic(own).pattern, &self.tangents[own][..]);
+        timer.time("preconditioner", || preconditioner.mend(stiffness, &defect, du));
     }
 
     /// Multipliers with `G l = e` next to the last ones: the smallest such if there are none.
@@ -127,42 +146,54 @@ impl<'a> StepSolver<'a> {
         coarse.add_transpose(1.0, &imbalance, &mut start);
         if self.lambda.is_some() {
             // The correction was round-off or the last tolerance: it must not push contact forces below zero.
-            for (l, _) in start.iter_mut().zip(&problem.constraints.rows).filter(|(_, row)| row.is_inequality()) {
-                *l = l.max(0.0);
-            }
+            let contacts = problem.constraints.rows.iter().zip(&mut start).filter(|(row, _)| row.is_inequality());
+            contacts.for_each(|(_, l)| *l = l.max(0.0));
         }
         start
     }
 
     /// Assembles the tangents at `u` and factorises those that changed; returns how many, over all ranks.
     fn update_tangents(&mut self, problem: &TornProblem, u: &Torn, timer: &Timer) -> Result<usize, String> {
-        let mut failure: Option<(usize, String)> = None;
+        let mut failure: Option<NotDefinite> = None;
         let mut factorised = Vec::with_capacity(u.len());
         for (own, subdomain) in problem.subdomains.iter().enumerate() {
             let pattern = &self.operator.factors.symbolic(own).pattern;
-            let (values, yielding) = &mut self.tangents[own];
+            let values = &mut self.tangents[own];
             values.resize(pattern.rows.len(), 0.0);
             let material = &problem.materials[own];
-            // An elastic tangent that was elastic before is the same matrix.
             let plastic = timer.time("assembly", || stiffness::assemble(subdomain, material, &u[own], pattern, values));
-            let unchanged = *yielding == Some(0) && plastic == 0;
-            *yielding = Some(plastic);
+            // An elastic tangent that was elastic before is the same matrix.
+            let unchanged = self.yielding[own] == Some(0) && plastic == 0;
+            self.yielding[own] = Some(plastic);
             factorised.push(f64::from(!unchanged));
             if unchanged || failure.is_some() {
                 continue;
             }
-            let outcome =
-                timer.time("factorisation", || self.operator.factors.factorise(own, subdomain, &self.tangents[own].0));
-            if let Err(error) = outcome {
-                failure = Some((subdomain.id, error.to_string()));
-            }
+            let outcome = timer.time("factorisation", || self.operator.factors.factorise(own, subdomain, values));
+            let interior = self.preconditioner.as_mut().and_then(|p| p.interior.as_mut());
+            let outcome = outcome.and_then(|()| match interior {
+                Some(factors) => timer.time("factorisation of the interior", || factors.factorise(own, subdomain.id, values)),
+                None => Ok(()),
+            });
+            failure = outcome.err();
         }
         // The lowest failing subdomain speaks; ranks that see no failure repeat its number.
-        let failed = failure.as_ref().map_or(f64::NEG_INFINITY, |(id, _)| -(*id as f64));
+        let failed = failure.as_ref().map_or(f64::NEG_INFINITY, |f| -(f.subdomain as f64));
         let lowest = problem.space.maximum(failed);
         if lowest > f64::NEG_INFINITY {
-            let own = failure.filter(|(id, _)| -(*id as f64) == lowest).map(|(_, message)| message);
-            return Err(own.unwrap_or_else(|| format!("subdomain {}: the stiffness matrix is not positive definite", -lowest)));
+            let subdomain = -lowest as usize;
+            let unknown = NotDefinite { subdomain, pivot: 0, dofs: 0 };
+            return Err(failure.filter(|f| f.subdomain == subdomain).unwrap_or(unknown).to_string());
+        }
+        if let Some(preconditioner) = &mut self.preconditioner {
+            let diagonals: Vec<Vec<f64>> = self
+                .tangents
+                .iter()
+                .enumerate()
+                .map(|(own, values)| self.operator.factors.symbolic(own).pattern.diagonal(values))
+                .collect();
+            preconditioner.scaling = timer
+                .time("scaling", || Scaling::new(problem.constraints, problem.gather, &diagonals, |_| true));
         }
         Ok(problem.space.sum(&factorised, 1)[0] as usize)
     }
@@ -176,57 +207,46 @@ impl<'a> StepSolver<'a> {
         timer: &Timer,
     ) -> (Vec<f64>, Outcome, Statistics) {
         let space = Multipliers(problem.space, timer);
-        let mut operator = Flexibility(&mut self.operator, timer);
-        let mut projection = Balanced(&mut self.projector, timer);
-        let mut projected = b.to_vec();
-        projection.project(&mut projected);
-        let size = space.norm(&projected);
-        let reference = *self.reference.get_or_insert(size);
-        let limits = Limits {
-            relative: self.settings.tolerance,
-            reference: Some(reference),
-            absolute: size * std::env::var("ETA").map_or(0.0, |s| s.parse().unwrap()),
-            products: self.settings.products,
+        let mut dual = Dual {
+            operator: &mut self.operator,
+            projector: &self.projector,
+            preconditioner: self.preconditioner.as_mut(),
+            tangents: &self.tangents,
+            timer,
         };
         let mut x = vec![0.0; b.len()];
+        let mut projected = b.to_vec();
+        dual.project(&mut projected);
+        let size = space.norm(&projected);
         if size == 0.0 {
             return (x, Outcome::Converged, Statistics::default());
         }
-        if problem.constraints.has_inequalities {
-            if self.norm.is_none() || std::env::var("RENORM").is_ok() {
-            let Some(estimate) = power::norm(&space, &mut operator, &mut projection, &projected) else {
-                return (x, Outcome::NotFinite, Statistics::default());
-            };
-            self.norm = Some(estimate.norm);
-            println!("norm {} {}", estimate.norm, estimate.products);
-            }
-            let estimate = power::Estimate { norm: self.norm.unwrap(), products: 0 };
-            let lower = problem
-                .constraints
-                .rows
-                .iter()
-                .zip(start)
-                .map(|(row, l)| if row.is_inequality() { -l } else { f64::NEG_INFINITY })
-                .collect();
-            let solution = smalse::solve(
-                smalse::Problem {
-                    space: &space,
-                    operator: &mut operator,
-                    projection: &mut projection,
-                    preconditioner: None,
-                    b: &projected,
-                    bounds: &Bounds::new(lower),
-                },
-                &smalse::Settings { limits, norm: estimate.norm, expansion: self.settings.expansion },
-                smalse::Start { x, multiplier: None },
-            );
-            let mut statistics = solution.statistics;
-            statistics.hessian += estimate.products;
-            (solution.x, solution.outcome, statistics)
-        } else {
-            let report =
-                pcpg::solve(&space, &mut operator, &mut projection, None, &mut x, &mut projected, &limits);
-            (x, report.outcome, report.statistics)
+        let limits = Limits {
+            relative: self.settings.tolerance,
+            reference: Some(*self.reference.get_or_insert(size)),
+            absolute: size * std::env::var("ETA").map_or(0.0, |s| s.parse().unwrap()),
+            products: self.settings.products,
+        };
+        if !problem.constraints.has_inequalities {
+            let report = Pcpg::new(&space).solve(&mut dual, &mut x, &mut projected, &limits);
+            return (x, report.outcome, report.statistics);
         }
+        let mut statistics = Statistics::default();
+            if self.norm.is_none() || std::env::var("RENORM").is_ok() {
+        let Some(estimate) = power::norm(&space, &mut dual, &projected) else {
+            return (x, Outcome::NotFinite, Statistics::default());
+        };
+        statistics.hessian += estimate.products;
+        self.norm = Some(estimate.norm);
+        }
+        let contacts = problem.constraints.rows.iter().zip(start);
+        let lower = contacts.map(|(row, l)| if row.is_inequality() { -l } else { f64::NEG_INFINITY }).collect();
+        let solution = smalse::solve(
+            smalse::Problem { space: &space, function: &mut dual, b: &projected, bounds: &Bounds::new(lower) },
+            &smalse::Settings { limits, norm: self.norm.unwrap(), expansion: self.settings.expansion },
+            smalse::Start { x, multiplier: None },
+        );
+        statistics += solution.statistics;
+        (solution.x, solution.outcome, statistics)
     }
 }
