@@ -1,3 +1,89 @@
 //! Quadratic programming with bounds and a projector: pure optimisation, no meshes, no FETI.
+//!
+//! The problem is min 1/2 x'A x - x'b over { x >= l, G x = 0 }, known by products with A and with the orthogonal
+//! projector P onto the null space of G ([`quadratic`]). A needs to be positive definite on that null space only.
+//!
+//! - [`smalse`]: bounds and equalities, convergence guaranteed; its inner loop is [`mprgp`] on [`bounds`];
+//! - [`pcpg`]: equalities only, with all search directions kept;
 
+//! - [`power`]: estimate of the norm of P A P that the penalty and the step lengths are scaled by.
+//!
+//! A solver never fails with an error: it ends with an [`Outcome`] and the best it has.
+
+pub mod bounds;
+pub mod mprgp;
+pub mod pcpg;
+pub mod power;
 pub mod quadratic;
+pub mod smalse;
+
+#[cfg(test)]
+mod dense;
+
+/// How a solver ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The tolerance is met.
+    Converged,
+    /// The allowed products are used up.
+    LimitReached,
+    /// An inner product was NaN or infinite.
+    NotFinite,
+    /// A direction without curvature and without a bound: the problem has no minimum, or A is not semidefinite.
+    Unbounded,
+}
+
+/// What a solver did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Updates of the equality multiplier (SMALSE-M) or of the set (active set).
+    pub outer: usize,
+    /// Conjugate gradient steps.
+    pub cg: usize,
+    /// Steps that ran into bounds.
+    pub expansions: usize,
+    /// Steps that left bounds.
+    pub proportionings: usize,
+    /// Products with A, the ones for fresh gradients included.
+    pub hessian: usize,
+    /// Applications of the preconditioner.
+    pub preconditioner: usize,
+}
+
+impl std::ops::AddAssign for Statistics {
+    fn add_assign(&mut self, other: Self) {
+        self.outer += other.outer;
+        self.cg += other.cg;
+        self.expansions += other.expansions;
+        self.proportionings += other.proportionings;
+        self.hessian += other.hessian;
+        self.preconditioner += other.preconditioner;
+    }
+}
+
+/// When to stop: a gradient norm of `max(relative * reference, absolute)` is small enough.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Tolerance relative to the reference.
+    pub relative: f64,
+    /// What the relative tolerance refers to; if absent the norm of P b (SMALSE-M) or of the first residual (PCPG).
+    pub reference: Option<f64>,
+    /// Tolerance in the units of the gradient.
+    pub absolute: f64,
+    /// Products with A that may be spent.
+    pub products: usize,
+}
+
+impl Limits {
+    /// The gradient norm to reach, where `fallback` is the reference if the caller gave none.
+    fn target(&self, fallback: f64) -> f64 {
+        (self.relative * self.reference.unwrap_or(fallback)).max(self.absolute)
+    }
+}
+
+/// `y = y + a x`.
+fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += a * x;
+    }
+}
