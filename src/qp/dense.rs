@@ -1,6 +1,6 @@
 //! For tests: dense matrices, a projector by Gram-Schmidt, random numbers, and the truth by trying all active sets.
 
-use super::quadratic::{Operator, Projection, Space};
+use super::quadratic::{Joined, Operator, Projection, Space};
 
 /// Plain inner products.
 pub struct Plain;
@@ -76,15 +76,20 @@ impl Matrix {
         Self::new(n, entries)
     }
 
-    /// The inverse, by solving for every unit vector.
+    /// The inverse of a positive definite matrix, by Gauss-Jordan elimination in place.
     pub fn inverse(&self) -> Self {
-        let n = self.n;
-        let column = |j: usize| {
-            let mut unit = vec![0.0; n];
-            unit[j] = 1.0;
-            solve(self.entries.clone(), unit).expect("regular")
-        };
-        Self::new(n, (0..n).flat_map(column).collect())
+        let (n, mut a) = (self.n, self.entries.clone());
+        for k in 0..n {
+            let pivot = 1.0 / a[k * n + k];
+            a[k * n + k] = 1.0;
+            a[k * n..(k + 1) * n].iter_mut().for_each(|v| *v *= pivot);
+            let row = a[k * n..(k + 1) * n].to_vec();
+            for i in (0..n).filter(|&i| i != k) {
+                let factor = std::mem::take(&mut a[i * n + k]);
+                a[i * n..(i + 1) * n].iter_mut().zip(&row).for_each(|(v, r)| *v -= factor * r);
+            }
+        }
+        Self::new(n, a)
     }
 
     pub fn cost(&self, x: &[f64], b: &[f64]) -> f64 {
@@ -122,6 +127,11 @@ impl Projection for Null {
             x.iter_mut().zip(row).for_each(|(x, r)| *x -= c * r);
         }
     }
+}
+
+/// A quadratic function without preconditioner.
+pub fn function<'a>(a: &'a mut Matrix, null: &'a mut Null) -> Joined<'a> {
+    Joined { operator: a, projection: null, preconditioner: None }
 }
 
 pub fn dot(x: &[f64], y: &[f64]) -> f64 {

@@ -7,7 +7,7 @@
 //!
 //! The residual b - A x is carried *unprojected*, so that a caller who changes P or moves x goes on from it.
 
-use super::quadratic::{Operator, Projection, Space};
+use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics, axpy};
 
 /// Directions kept (two vectors each); beyond that the oldest is replaced.
@@ -26,74 +26,6 @@ pub struct Report {
     pub norm: f64,
 }
 
-/// Solves from `x`, with `residual = b - A x` on entry and on return (at x = 0 it is b: no product needed). A direction
-/// without curvature ends it as [`Outcome::Unbounded`].
-pub fn solve(
-    space: &dyn Space,
-    operator: &mut dyn Operator,
-    projection: &mut dyn Projection,
-    mut preconditioner: Option<&mut dyn Operator>,
-    x: &mut [f64],
-    residual: &mut [f64],
-    limits: &Limits,
-) -> Report {
-    let n = x.len();
-    let mut kept: Vec<Direction> = Vec::new();
-    let (mut inside, mut z) = (vec![0.0; n], vec![0.0; n]);
-    let mut statistics = Statistics::default();
-    let mut first_norm = None;
-    loop {
-        inside.copy_from_slice(residual);
-        projection.project(&mut inside);
-        let norm = space.norm(&inside);
-        let first_norm = *first_norm.get_or_insert(norm);
-        let report = |outcome, statistics| Report { outcome, statistics, first_norm, norm };
-        if !norm.is_finite() {
-            return report(Outcome::NotFinite, statistics);
-        }
-        if norm <= limits.target(first_norm) {
-            return report(Outcome::Converged, statistics);
-        }
-        if statistics.hessian >= limits.products {
-            return report(Outcome::LimitReached, statistics);
-        }
-
-        if let Some(m) = preconditioner.as_deref_mut() {
-            m.apply(&inside, &mut z);
-            projection.project(&mut z);
-            statistics.preconditioner += 1;
-        } else {
-            z.copy_from_slice(&inside);
-        }
-        let pairs: Vec<_> = kept.iter().map(|d| (&z[..], &d.ap[..])).collect();
-        let coefficients = space.dots(&pairs);
-        for (d, c) in kept.iter().zip(coefficients) {
-            axpy(-c / d.curvature, &d.p, &mut z);
-        }
-
-        let mut ap = vec![0.0; n];
-        operator.apply(&z, &mut ap);
-        statistics.hessian += 1;
-        let d = space.dots(&[(&z, &ap), (&z, &inside)]);
-        if !(d[0].is_finite() && d[1].is_finite()) {
-            return report(Outcome::NotFinite, statistics);
-        }
-        if d[0] <= 0.0 {
-            return report(Outcome::Unbounded, statistics);
-        }
-        let step = d[1] / d[0];
-        axpy(step, &z, x);
-        axpy(-step, &ap, residual);
-        let direction = Direction { p: std::mem::replace(&mut z, vec![0.0; n]), ap, curvature: d[0] };
-        if kept.len() < KEPT {
-            kept.push(direction);
-        } else {
-            kept[statistics.cg % KEPT] = direction;
-        }
-        statistics.cg += 1;
-    }
-}
-
 /// A search direction with its product.
 struct Direction {
     p: Vec<f64>,
@@ -101,16 +33,116 @@ struct Direction {
     curvature: f64,
 }
 
+/// The solver with the directions it keeps. As long as A and P stay the same it goes on from them: to solve loosely,
+/// look, and solve on costs nothing.
+pub struct Pcpg<'a> {
+    space: &'a dyn Space,
+    kept: Vec<Direction>,
+    oldest: usize,
+}
+
+impl<'a> Pcpg<'a> {
+    /// A solver that knows no direction yet.
+    pub fn new(space: &'a dyn Space) -> Self {
+        Self { space, kept: Vec::new(), oldest: 0 }
+    }
+
+    /// Drops the directions; due when A or P has changed.
+    pub fn forget(&mut self) {
+        self.kept.clear();
+        self.oldest = 0;
+    }
+
+    /// Solves from `x`, with `residual = b - A x` on entry and on return (at x = 0 it is b: no product needed). A
+    /// direction without curvature ends it as [`Outcome::Unbounded`].
+    pub fn solve(
+        &mut self,
+        function: &mut dyn Quadratic,
+        x: &mut [f64],
+        residual: &mut [f64],
+        limits: &Limits,
+    ) -> Report {
+        let n = x.len();
+        let (mut inside, mut z) = (vec![0.0; n], vec![0.0; n]);
+        let mut statistics = Statistics::default();
+        let mut first = None;
+        loop {
+            inside.copy_from_slice(residual);
+            function.project(&mut inside);
+            let norm = self.space.norm(&inside);
+            let first_norm = *first.get_or_insert(norm);
+            let report = |outcome, statistics| Report { outcome, statistics, first_norm, norm };
+            if !norm.is_finite() {
+                return report(Outcome::NotFinite, statistics);
+            }
+            if norm <= limits.target(first_norm) {
+                return report(Outcome::Converged, statistics);
+            }
+            if statistics.hessian >= limits.products {
+                return report(Outcome::LimitReached, statistics);
+            }
+
+            if function.precondition(&inside, &mut z) {
+                function.project(&mut z);
+                statistics.preconditioner += 1;
+            } else {
+                z.copy_from_slice(&inside);
+            }
+            self.orthogonalise(&mut z);
+            let mut ap = vec![0.0; n];
+            function.apply(&z, &mut ap);
+            statistics.hessian += 1;
+            let d = self.space.dots(&[(&z, &ap), (&z, &inside)]);
+            let (curvature, slope) = (d[0], d[1]);
+            if !(curvature.is_finite() && slope.is_finite()) {
+                return report(Outcome::NotFinite, statistics);
+            }
+            if curvature <= 0.0 {
+                return report(Outcome::Unbounded, statistics);
+            }
+            axpy(slope / curvature, &z, x);
+            axpy(-slope / curvature, &ap, residual);
+            statistics.cg += 1;
+            let p = std::mem::replace(&mut z, vec![0.0; n]);
+            self.keep(Direction { p, ap, curvature });
+        }
+    }
+
+    /// Takes the kept directions out of `z`, in the A-inner product.
+    fn orthogonalise(&self, z: &mut [f64]) {
+        let pairs: Vec<_> = self.kept.iter().map(|d| (&*z, &d.ap[..])).collect();
+        if pairs.is_empty() {
+            return;
+        }
+        let coefficients = self.space.dots(&pairs);
+        for (d, c) in self.kept.iter().zip(coefficients) {
+            axpy(-c / d.curvature, &d.p, z);
+        }
+    }
+
+    fn keep(&mut self, direction: Direction) {
+        if self.kept.len() < KEPT {
+            self.kept.push(direction);
+        } else {
+            self.kept[self.oldest] = direction;
+            self.oldest = (self.oldest + 1) % KEPT;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::dense::{Matrix, Null, Plain, Random, distance, dot, enumerate};
+    use super::super::dense::{Matrix, Null, Plain, Random, distance, dot, enumerate, function};
+    use super::super::quadratic::{Joined, Operator};
     use super::*;
 
     const LIMITS: Limits = Limits { relative: 1e-10, reference: None, absolute: 0.0, products: 1000 };
 
-    fn run(a: &mut Matrix, null: &mut Null, m: Option<&mut dyn Operator>, b: &[f64], x: &mut [f64]) -> Report {
+    fn run(a: &mut Matrix, null: &mut Null, m: Option<&mut Matrix>, b: &[f64], x: &mut [f64]) -> Report {
         let mut residual: Vec<f64> = a.times(x).iter().zip(b).map(|(ax, b)| b - ax).collect();
-        let report = solve(&Plain, a, null, m, x, &mut residual, &LIMITS);
+        let preconditioner = m.map(|m| m as &mut dyn Operator);
+        let mut function = Joined { operator: a, projection: null, preconditioner };
+        let report = Pcpg::new(&Plain).solve(&mut function, x, &mut residual, &LIMITS);
         let ax = a.times(x);
         let recomputed: Vec<f64> = b.iter().zip(&ax).map(|(b, ax)| b - ax).collect();
         assert!(report.outcome != Outcome::Converged || distance(&recomputed, &residual) < 1e-10);
@@ -144,7 +176,7 @@ mod tests {
         assert!((dot(&null.rows[0], &x) - before).abs() < 1e-12);
         let mut residual: Vec<f64> = a.times(&x).iter().zip(&b).map(|(ax, b)| b - ax).collect();
         let limits = Limits { reference: Some(first.first_norm), relative: 1e-9, ..LIMITS };
-        let again = solve(&Plain, &mut a, &mut null, None, &mut x, &mut residual, &limits);
+        let again = Pcpg::new(&Plain).solve(&mut function(&mut a, &mut null), &mut x, &mut residual, &limits);
         assert_eq!((again.outcome, again.statistics.hessian), (Outcome::Converged, 0));
     }
 
@@ -165,6 +197,25 @@ mod tests {
     }
 
     #[test]
+    fn going_on_from_a_loose_solution_costs_no_more() {
+        let mut random = Random::new(8);
+        let n = 80;
+        let mut a = Matrix::with_condition(n, 1e3, &mut random);
+        let (b, mut null) = (random.vector(n), Null::of(vec![random.vector(n)]));
+        let mut solver = Pcpg::new(&Plain);
+        let (mut x, mut residual, mut products) = (vec![0.0; n], b.clone(), 0);
+        for relative in [1e-1, 1e-3, 1e-10] {
+            let limits = Limits { relative, reference: Some(5.0), ..LIMITS };
+            let report = solver.solve(&mut function(&mut a, &mut null), &mut x, &mut residual, &limits);
+            products += report.statistics.hessian;
+        }
+        let mut y = vec![0.0; n];
+        let at_once = run(&mut a, &mut null, None, &b, &mut y);
+        assert!(products <= at_once.statistics.hessian + 1, "{products} {at_once:?}");
+        assert!(distance(&x, &y) < 1e-6);
+    }
+
+    #[test]
     fn ill_conditioned() {
         let mut random = Random::new(6);
         let n = 60;
@@ -173,7 +224,8 @@ mod tests {
         let mut x = vec![0.0; n];
         let mut residual = b.clone();
         let limits = Limits { relative: 1e-6, ..LIMITS };
-        let report = solve(&Plain, &mut a, &mut Null::default(), None, &mut x, &mut residual, &limits);
+        let mut null = Null::default();
+        let report = Pcpg::new(&Plain).solve(&mut function(&mut a, &mut null), &mut x, &mut residual, &limits);
         assert_eq!(report.outcome, Outcome::Converged);
         assert!(report.statistics.hessian <= 2 * n, "{report:?}");
         assert!(distance(&a.times(&x), &b) < 1e-5 * dot(&b, &b).sqrt());
@@ -187,7 +239,9 @@ mod tests {
         let b = random.vector(5);
         assert_eq!(run(&mut a, &mut Null::default(), None, &b, &mut [0.0; 5]).outcome, Outcome::Unbounded);
         a.entries[7] = f64::NAN;
-        let report = solve(&Plain, &mut a, &mut Null::default(), None, &mut [0.0; 5], &mut b.clone(), &LIMITS);
+        let (mut x, mut residual) = (vec![0.0; 5], b.clone());
+        let mut null = Null::default();
+        let report = Pcpg::new(&Plain).solve(&mut function(&mut a, &mut null), &mut x, &mut residual, &LIMITS);
         assert_eq!(report.outcome, Outcome::NotFinite);
     }
 }

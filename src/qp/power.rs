@@ -6,7 +6,7 @@
 //! spoil the largest value.
 
 use super::axpy;
-use super::quadratic::{Operator, Projection, Space};
+use super::quadratic::{Quadratic, Space};
 
 /// Products at most.
 const STEPS: usize = 12;
@@ -24,23 +24,18 @@ pub struct Estimate {
 
 /// Estimates the norm of P A P from a start vector. `None` if there is nothing to estimate from: P `start` is zero, or
 /// something is not finite, or P A P vanishes on the start vector.
-pub fn norm(
-    space: &dyn Space,
-    operator: &mut dyn Operator,
-    projection: &mut dyn Projection,
-    start: &[f64],
-) -> Option<Estimate> {
+pub fn norm(space: &dyn Space, function: &mut dyn Quadratic, start: &[f64]) -> Option<Estimate> {
     let mut v = start.to_vec();
     let (mut last, mut w) = (vec![0.0; v.len()], vec![0.0; v.len()]);
     let (mut diagonal, mut coupling) = (Vec::new(), Vec::new());
     let mut found = 0.0;
 
-    projection.project(&mut v);
+    function.project(&mut v);
     let mut length = space.norm(&v);
     while length > 0.0 && length.is_finite() && diagonal.len() < STEPS {
         v.iter_mut().for_each(|v| *v /= length);
-        operator.apply(&v, &mut w);
-        projection.project(&mut w);
+        function.apply(&v, &mut w);
+        function.project(&mut w);
         let quotient = space.dot(&v, &w);
         if !quotient.is_finite() {
             return None;
@@ -86,7 +81,7 @@ fn largest(diagonal: &[f64], coupling: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dense::{Matrix, Null, Plain, Random};
+    use super::super::dense::{Matrix, Null, Plain, Random, function};
     use super::*;
 
     #[test]
@@ -103,7 +98,7 @@ mod tests {
             let n = 60;
             let (mut a, norm_exact) = (Matrix::with_condition(n, cond, &mut random), 1.0);
             let start = random.vector(n);
-            let found = norm(&Plain, &mut a, &mut Null::default(), &start).expect("an estimate");
+            let found = norm(&Plain, &mut function(&mut a, &mut Null::default()), &start).expect("an estimate");
             assert!(found.norm > 0.9 * norm_exact && found.norm < norm_exact * (1.0 + 1e-10), "{found:?}");
             assert_eq!(found.products, a.products);
             assert!(found.products <= STEPS);
@@ -114,8 +109,8 @@ mod tests {
     fn nothing_to_estimate_from() {
         let mut random = Random::new(2);
         let mut a = Matrix::with_condition(4, 10.0, &mut random);
-        assert_eq!(norm(&Plain, &mut a, &mut Null::default(), &[0.0; 4]), None);
+        assert_eq!(norm(&Plain, &mut function(&mut a, &mut Null::default()), &[0.0; 4]), None);
         a.entries[5] = f64::NAN;
-        assert_eq!(norm(&Plain, &mut a, &mut Null::default(), &[1.0; 4]), None);
+        assert_eq!(norm(&Plain, &mut function(&mut a, &mut Null::default()), &[1.0; 4]), None);
     }
 }

@@ -33,3 +33,40 @@ pub trait Projection {
     /// `x = P x`, in place.
     fn project(&mut self, x: &mut [f64]);
 }
+
+/// All that a solver with equality constraints asks of its function: A, P and, if there is one, a preconditioner M.
+pub trait Quadratic: Operator + Projection {
+    /// `z = M r` with M an approximate inverse of A, symmetric and positive on Ker G; returns false, and leaves `z`
+    /// alone, if there is none.
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool;
+}
+
+/// [`Quadratic`] put together from its parts.
+pub struct Joined<'a> {
+    /// A.
+    pub operator: &'a mut dyn Operator,
+    /// P.
+    pub projection: &'a mut dyn Projection,
+    /// M.
+    pub preconditioner: Option<&'a mut dyn Operator>,
+}
+
+impl Operator for Joined<'_> {
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.operator.apply(x, y);
+    }
+}
+
+impl Projection for Joined<'_> {
+    fn project(&mut self, x: &mut [f64]) {
+        self.projection.project(x);
+    }
+}
+
+impl Quadratic for Joined<'_> {
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
+        let Some(m) = self.preconditioner.as_deref_mut() else { return false };
+        m.apply(r, z);
+        true
+    }
+}
