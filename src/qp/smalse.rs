@@ -56,7 +56,7 @@ pub struct Settings {
 pub struct Start {
     /// Unknowns; made feasible.
     pub x: Vec<f64>,
-    /// [`Solution::multiplier`] of a similar problem with the same P.
+    /// [`Solution::multiplier`] of a similar problem; projected to the present Im G'.
     pub multiplier: Option<Vec<f64>>,
 }
 
@@ -129,7 +129,12 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let n = b.len();
     let mut b = b.to_vec();
     function.project(&mut b);
+    let mut inside = vec![0.0; n];
     let mut multiplier = start.multiplier.unwrap_or_else(|| vec![0.0; n]);
+    // What is not in Im G' would shift the solution.
+    inside.copy_from_slice(&multiplier);
+    function.project(&mut inside);
+    axpy(-1.0, &inside, &mut multiplier);
     let mut x = start.x;
     bounds.project(&mut x);
 
@@ -141,7 +146,6 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let penalty = PENALTY * norm;
     let mut balance = BALANCE * norm;
 
-    let inside = vec![0.0; n];
     let mut hessian = Penalised { function, penalty, inside };
     let mut inner = Mprgp::new(space, bounds, settings.expansion, penalty, settings.limits.products);
     let mut statistics = Statistics::default();

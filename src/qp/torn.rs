@@ -93,21 +93,21 @@ impl Torn {
         let mut lumped = Matrix::new(n, vec![0.0; n * n]);
         let mut d: Vec<f64> = gap.iter().map(|g| -g).collect();
         let mut rows = vec![Row { inside: vec![], full: vec![0.0; n], right: 0.0 }; parts * parts];
-        for part in 0..parts * parts {
+        for (part, coarse) in rows.iter_mut().enumerate() {
             let kernel = 1.0 / (local as f64).sqrt();
-            rows[part].right = kernel * load(part) * local as f64;
+            coarse.right = kernel * load(part) * local as f64;
             let load = inverse.times(&vec![load(part); local]);
             for j in (0..n).filter(|&j| b[j].iter().any(|((p, _), _)| *p == part)) {
                 let (soft, stiff) = (column(&b[j], part, &inverse), column(&b[j], part, &k));
-                for i in 0..n {
-                    for ((_, node), value) in b[i].iter().filter(|((p, _), _)| *p == part) {
+                for (i, row) in b.iter().enumerate() {
+                    for ((_, node), value) in row.iter().filter(|((p, _), _)| *p == part) {
                         f.entries[i * n + j] += value * soft[*node];
                         lumped.entries[i * n + j] += value * stiff[*node];
                     }
                 }
                 for ((_, node), value) in b[j].iter().filter(|((p, _), _)| *p == part) {
                     d[j] += value * load[*node];
-                    rows[part].full[j] += value * kernel;
+                    coarse.full[j] += value * kernel;
                 }
             }
         }
