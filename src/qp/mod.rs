@@ -18,6 +18,8 @@ pub mod power;
 pub mod quadratic;
 pub mod smalse;
 
+mod penalty;
+
 #[cfg(test)]
 mod dense;
 #[cfg(test)]

@@ -14,7 +14,8 @@
 //! A and two projections. Convergence does not depend on the quality of the norm, a few per cent are plenty.
 
 use super::bounds::Bounds;
-use super::mprgp::{Expansion, Hessian, Mprgp, Norms, Point};
+use super::mprgp::{Expansion, Mprgp, Norms, Point};
+use super::penalty::Penalised;
 use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics, axpy};
 
@@ -78,49 +79,6 @@ pub struct Solution {
     pub gradient_norm: f64,
     /// Norm of Q x at the end.
     pub defect_norm: f64,
-}
-
-/// The Hessian P A P + rho Q.
-struct Penalised<'a> {
-    function: &'a mut dyn Quadratic,
-    penalty: f64,
-    inside: Vec<f64>,
-}
-
-impl Penalised<'_> {
-    /// Takes the rounding in Ker G out of the defect, lest the multiplier collects it, rho times enlarged.
-    fn clean(&mut self, point: &mut Point) {
-        self.inside.copy_from_slice(&point.defect);
-        self.function.project(&mut self.inside);
-        axpy(-1.0, &self.inside, &mut point.defect);
-        axpy(-self.penalty, &self.inside, &mut point.gradient);
-    }
-}
-
-impl Hessian for Penalised<'_> {
-    fn apply(&mut self, p: &[f64], hp: &mut [f64], defect: &mut [f64]) {
-        self.inside.copy_from_slice(p);
-        self.function.project(&mut self.inside);
-        self.function.apply(&self.inside, hp);
-        self.function.project(hp);
-        for (i, d) in defect.iter_mut().enumerate() {
-            *d = p[i] - self.inside[i];
-            hp[i] += self.penalty * *d;
-        }
-    }
-
-    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
-        self.inside.copy_from_slice(r);
-        self.function.project(&mut self.inside);
-        if !self.function.precondition(&self.inside, z) {
-            return false;
-        }
-        self.function.project(z);
-        for ((z, r), inside) in z.iter_mut().zip(r).zip(&self.inside) {
-            *z += (r - inside) / self.penalty;
-        }
-        true
-    }
 }
 
 /// Solves the problem. Every rank calls this with its own entries.
