@@ -112,7 +112,12 @@ impl<'a> StepSolver<'a> {
                 recover::add_rigid_motion(problem, &self.projector.coarse, &kept, &defect, &mut du)
             })
             .map_err(|floating| floating.to_string())?;
+        let nrm=|d: &Torn| { let mut r = vec![0.0; rows]; problem.gather.apply(d, &mut r); let mut e=0.0; let mut c=0.0_f64; for ((r,s),row) in r.iter().zip(&slack).zip(&problem.constraints.rows) { if row.is_inequality() { c=c.max(r-s) } else { e+=(r-s)*(r-s) } } (e.sqrt(),c) };
+        let mut kk=0.0; let mut fd=0.0; for own in 0..du.len() { let mut y=vec![0.0;du[own].len()]; self.operator.factors.symbolic(own).pattern.multiply_add(&self.tangents[own],&du[own],&mut y); for i in 0..y.len(){ kk+=y[i]*du[own][i]; fd += (problem.loads[own][i]-state.forces[own][i])*du[own][i]; } }
+        eprintln!("before mend {:?} model {:e} {:e} J {:e}", nrm(&du), kk, fd, 0.5*kk-fd);
         self.mend(problem, &slack, &mut du, timer);
+        let mut kk=0.0; let mut fd=0.0; for own in 0..du.len() { let mut y=vec![0.0;du[own].len()]; self.operator.factors.symbolic(own).pattern.multiply_add(&self.tangents[own],&du[own],&mut y); for i in 0..y.len(){ kk+=y[i]*du[own][i]; fd += (problem.loads[own][i]-state.forces[own][i])*du[own][i]; } }
+        eprintln!("after mend {:?} model {:e} {:e} J {:e}", nrm(&du), kk, fd, 0.5*kk-fd);
         self.lambda = Some(lambda.clone());
         let applications = self.operator.applications() - before;
         Ok(Step { du, lambda, outcome, statistics, applications, factorisations })
@@ -221,6 +226,7 @@ impl<'a> StepSolver<'a> {
         if size == 0.0 {
             return (x, Outcome::Converged, Statistics::default());
         }
+        eprintln!("size {size:e}");
         let limits = Limits {
             relative: self.settings.tolerance,
             reference: Some(*self.reference.get_or_insert(size)),

@@ -5,11 +5,12 @@
 //!
 //! - [`smalse`]: bounds and equalities, convergence guaranteed; its inner loop is [`mprgp`] on [`bounds`];
 //! - [`pcpg`]: equalities only, with all search directions kept;
-
+//! - [`active_set`]: guesses the active bounds, solves for equalities, corrects the guess: fast, but without a proof;
 //! - [`power`]: estimate of the norm of P A P that the penalty and the step lengths are scaled by.
 //!
 //! A solver never fails with an error: it ends with an [`Outcome`] and the best it has.
 
+pub mod active_set;
 pub mod bounds;
 pub mod mprgp;
 pub mod pcpg;
@@ -17,8 +18,12 @@ pub mod power;
 pub mod quadratic;
 pub mod smalse;
 
+mod penalty;
+
 #[cfg(test)]
 mod dense;
+#[cfg(test)]
+mod torn;
 
 /// How a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +34,8 @@ pub enum Outcome {
     LimitReached,
     /// An inner product was NaN or infinite.
     NotFinite,
+    /// The active set does not settle: another solver has to do it.
+    Cycled,
     /// A direction without curvature and without a bound: the problem has no minimum, or A is not semidefinite.
     Unbounded,
 }

@@ -41,7 +41,7 @@ pub trait Quadratic: Operator + Projection {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool;
 }
 
-/// [`Quadratic`] put together from its parts.
+/// A [`Quadratic`] put together from its parts.
 pub struct Joined<'a> {
     /// A.
     pub operator: &'a mut dyn Operator,

@@ -14,7 +14,8 @@
 //! A and two projections. Convergence does not depend on the quality of the norm, a few per cent are plenty.
 
 use super::bounds::Bounds;
-use super::mprgp::{Expansion, Hessian, Mprgp, Norms, Point};
+use super::mprgp::{Expansion, Mprgp, Norms, Point};
+use super::penalty::Penalised;
 use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics, axpy};
 
@@ -56,7 +57,7 @@ pub struct Settings {
 pub struct Start {
     /// Unknowns; made feasible.
     pub x: Vec<f64>,
-    /// [`Solution::multiplier`] of a similar problem with the same P.
+    /// [`Solution::multiplier`] of a similar problem; projected to the present Im G'.
     pub multiplier: Option<Vec<f64>>,
 }
 
@@ -80,56 +81,18 @@ pub struct Solution {
     pub defect_norm: f64,
 }
 
-/// The Hessian P A P + rho Q.
-struct Penalised<'a> {
-    function: &'a mut dyn Quadratic,
-    penalty: f64,
-    inside: Vec<f64>,
-}
-
-impl Penalised<'_> {
-    /// Takes the rounding in Ker G out of the defect, lest the multiplier collects it, rho times enlarged.
-    fn clean(&mut self, point: &mut Point) {
-        self.inside.copy_from_slice(&point.defect);
-        self.function.project(&mut self.inside);
-        axpy(-1.0, &self.inside, &mut point.defect);
-        axpy(-self.penalty, &self.inside, &mut point.gradient);
-    }
-}
-
-impl Hessian for Penalised<'_> {
-    fn apply(&mut self, p: &[f64], hp: &mut [f64], defect: &mut [f64]) {
-        self.inside.copy_from_slice(p);
-        self.function.project(&mut self.inside);
-        self.function.apply(&self.inside, hp);
-        self.function.project(hp);
-        for (i, d) in defect.iter_mut().enumerate() {
-            *d = p[i] - self.inside[i];
-            hp[i] += self.penalty * *d;
-        }
-    }
-
-    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
-        self.inside.copy_from_slice(r);
-        self.function.project(&mut self.inside);
-        if !self.function.precondition(&self.inside, z) {
-            return false;
-        }
-        self.function.project(z);
-        for ((z, r), inside) in z.iter_mut().zip(r).zip(&self.inside) {
-            *z += (r - inside) / self.penalty;
-        }
-        true
-    }
-}
-
 /// Solves the problem. Every rank calls this with its own entries.
 pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let Problem { space, function, b, bounds } = problem;
     let n = b.len();
     let mut b = b.to_vec();
     function.project(&mut b);
+    let mut inside = vec![0.0; n];
     let mut multiplier = start.multiplier.unwrap_or_else(|| vec![0.0; n]);
+    // What is not in Im G' would shift the solution.
+    inside.copy_from_slice(&multiplier);
+    function.project(&mut inside);
+    axpy(-1.0, &inside, &mut multiplier);
     let mut x = start.x;
     bounds.project(&mut x);
 
@@ -141,7 +104,6 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let penalty = PENALTY * norm;
     let mut balance = BALANCE * norm;
 
-    let inside = vec![0.0; n];
     let mut hessian = Penalised { function, penalty, inside };
     let mut inner = Mprgp::new(space, bounds, settings.expansion, penalty, settings.limits.products);
     let mut statistics = Statistics::default();

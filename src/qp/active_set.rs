@@ -1,0 +1,257 @@
+//! Active set of bounds around PCPG: min 1/2 x'A x - x'd over { x_i >= 0 for bounded i, G x = e }.
+//!
+//! The fast path of contact: guess the rows that carry a force, solve the equality problem on them, correct the guess
+//! (the primal-dual active set strategy, Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2002), applied to the dual).
+//! Rows with x_i < 0 are let go; rows outside that show a violated gap (d - A x - G'a)_i > 0 are taken in. The equality
+//! problems are solved loosely: whenever the residual has dropped by a factor the set is looked at, and PCPG goes on
+//! with its directions if the set stands.
+//!
+//! No proof of convergence goes with it: sets that come back end as [`Outcome::Cycled`], and the caller turns to
+//! [`super::smalse`]. Unlike there x is not homogenised: bounds are zero and the equalities have a right-hand side,
+//! both the caller's affair, since the projector changes with the set.
+
+use super::pcpg::Pcpg;
+use super::quadratic::{Quadratic, Space};
+use super::{Limits, Outcome, Statistics, axpy};
+
+/// Factor by which the residual drops between two looks at the set.
+const LOOSE: f64 = 0.1;
+/// Sets that may pass.
+const SETS: usize = 60;
+/// A move of x smaller than this, relative to x, is rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// The problem on the rows of a set. All answers must be the same on all ranks.
+pub trait Face: Quadratic {
+    /// From now on x, P and M live on the kept rows: all others are zero. False if the equalities cannot be met there
+    /// (a body would hang on nothing).
+    fn restrict(&mut self, kept: &[bool]) -> bool;
+
+    /// The shortest way into { G x = e, x = 0 off the kept rows }.
+    fn restore(&mut self, x: &mut [f64]);
+
+    /// From `residual` = d - A x on all rows, in place: residual - G'a with the a that makes it smallest on the kept rows.
+    /// A positive entry is a violated gap.
+    fn gaps(&mut self, residual: &mut [f64]);
+}
+
+/// What was found.
+pub struct Solution {
+    /// The unknowns, zero off the kept rows; not negative where bounded if converged.
+    pub x: Vec<f64>,
+    /// `d - A x`.
+    pub residual: Vec<f64>,
+    /// The rows that are not held at zero.
+    pub kept: Vec<bool>,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// What it took; `outer` counts sets.
+    pub statistics: Statistics,
+    /// Norm of the projected residual at the end.
+    pub norm: f64,
+}
+
+/// Solves from `x` and the set `kept` (true for all rows without a bound). The reference of `limits` is by default the
+/// first residual, which at a warm start is too small: give one there.
+pub fn solve(
+    space: &dyn Space,
+    face: &mut dyn Face,
+    d: &[f64],
+    bounded: &[bool],
+    start: (Vec<f64>, Vec<bool>),
+    limits: &Limits,
+) -> Solution {
+    let (x, kept) = start;
+    let n = d.len();
+    let mut run = Run {
+        space,
+        bounded,
+        x: vec![0.0; n],
+        residual: d.to_vec(),
+        kept,
+        work: vec![0.0; n],
+        image: vec![0.0; n],
+        statistics: Statistics::default(),
+        norm: f64::NAN,
+    };
+    let outcome = run.iterate(face, x, limits);
+    let Run { x, residual, kept, statistics, norm, .. } = run;
+    Solution { x, residual, kept, outcome, statistics, norm }
+}
+
+struct Run<'a> {
+    space: &'a dyn Space,
+    bounded: &'a [bool],
+    x: Vec<f64>,
+    residual: Vec<f64>,
+    kept: Vec<bool>,
+    work: Vec<f64>,
+    image: Vec<f64>,
+    statistics: Statistics,
+    norm: f64,
+}
+
+impl Run<'_> {
+    /// Alternates between solving and correcting the set; `wish` is where x would like to start.
+    fn iterate(&mut self, face: &mut dyn Face, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
+        let mut solver = Pcpg::new(self.space);
+        let mut target = None;
+        // Sets seen, and whether sets are solved to the end before they are corrected: so once one has come back.
+        let (mut history, mut strict) = (Vec::new(), false);
+        while history.len() < SETS {
+            history.push(self.kept.clone());
+            if !face.restrict(&self.kept) {
+                return Outcome::Cycled;
+            }
+            solver.forget();
+            self.move_to(face, &mut wish);
+            self.statistics.outer += 1;
+            let target = *target.get_or_insert_with(|| limits.target(self.projected_norm(face)));
+            loop {
+                let products = limits.products.saturating_sub(self.statistics.hessian);
+                let relative = if strict { 0.0 } else { LOOSE };
+                let loose = Limits { relative, reference: None, absolute: target, products };
+                let report = solver.solve(face, &mut self.x, &mut self.residual, &loose);
+                self.statistics += report.statistics;
+                self.norm = report.norm;
+                if report.outcome != Outcome::Converged {
+                    return report.outcome;
+                }
+                if self.correct(face, target) {
+                    break;
+                }
+                if report.norm <= target {
+                    return Outcome::Converged;
+                }
+            }
+            if self.seen(&history) {
+                if strict {
+                    return Outcome::Cycled;
+                }
+                strict = true;
+                history.clear();
+            }
+            wish.copy_from_slice(&self.x);
+        }
+        Outcome::Cycled
+    }
+
+    /// Moves x as near to `wish` as the set allows, by one product; by none where it is there already.
+    fn move_to(&mut self, face: &mut dyn Face, wish: &mut [f64]) {
+        for (w, kept) in wish.iter_mut().zip(&self.kept) {
+            *w *= f64::from(*kept);
+        }
+        face.restore(wish);
+        for ((move_, w), x) in self.work.iter_mut().zip(&*wish).zip(&self.x) {
+            *move_ = w - x;
+        }
+        let d = self.space.dots(&[(&self.work, &self.work), (wish, wish)]);
+        if d[0] <= ROUNDING * ROUNDING * d[1] {
+            return;
+        }
+        face.apply(&self.work, &mut self.image);
+        self.statistics.hessian += 1;
+        axpy(-1.0, &self.image, &mut self.residual);
+        self.x.copy_from_slice(wish);
+    }
+
+    fn projected_norm(&mut self, face: &mut dyn Face) -> f64 {
+        self.work.copy_from_slice(&self.residual);
+        face.project(&mut self.work);
+        self.space.norm(&self.work)
+    }
+
+    /// Lets rows of negative force go and takes rows of violated gap in; true if any rank has changed something. The
+    /// tolerance for gaps only keeps a row of no force and no gap from coming and going.
+    fn correct(&mut self, face: &mut dyn Face, tolerance: f64) -> bool {
+        self.work.copy_from_slice(&self.residual);
+        face.gaps(&mut self.work);
+        for i in 0..self.x.len() {
+            let wanted = if self.kept[i] { self.x[i] >= 0.0 } else { self.work[i] > tolerance };
+            let changes = self.bounded[i] && wanted != self.kept[i];
+            self.kept[i] ^= changes;
+            self.work[i] = f64::from(changes);
+        }
+        self.space.dot(&self.work, &self.work) > 0.0
+    }
+
+    /// Whether the present set has been there before, on all ranks.
+    fn seen(&self, history: &[Vec<bool>]) -> bool {
+        history.iter().any(|old| self.space.minimum(f64::from(*old == self.kept)) == 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dense::{Plain, distance, dot};
+    use super::super::power;
+    use super::super::torn::{Torn, homogenised};
+    use super::*;
+
+    const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, products: 2000 };
+
+    fn from(torn: &mut Torn, x: Vec<f64>, kept: Vec<bool>, limits: &Limits) -> Solution {
+        let (d, bounded) = (torn.d.clone(), torn.bounded.clone());
+        solve(&Plain, torn, &d, &bounded, (x, kept), limits)
+    }
+
+    #[test]
+    fn equals_smalse() {
+        for (preconditioned, most) in [(false, 85), (true, 65)] {
+            let mut torn = Torn::membrane(4, 6);
+            torn.preconditioned = preconditioned;
+            let n = torn.d.len();
+            let slow = homogenised(&mut torn, 1e-8);
+            let fast = from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS);
+            assert_eq!((slow.outcome, fast.outcome), (Outcome::Converged, Outcome::Converged));
+            assert!(slow.statistics.hessian <= if preconditioned { 130 } else { 175 }, "{:?}", slow.statistics);
+            assert!(distance(&slow.x, &fast.x) < 1e-5 * dot(&fast.x, &fast.x).sqrt());
+            assert!(fast.statistics.hessian <= most, "{:?}", fast.statistics);
+            let (rows, carrying) =
+                (torn.bounded.iter().filter(|b| **b).count(), fast.kept.iter().filter(|k| !**k).count());
+            assert!(carrying > 0 && carrying < rows, "{carrying} of {rows}");
+            torn.restrict(&fast.kept);
+            let mut gaps = fast.residual.clone();
+            torn.gaps(&mut gaps);
+            for i in (0..n).filter(|i| torn.bounded[*i]) {
+                assert!(fast.x[i] >= 0.0 && gaps[i] < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn any_start_gives_the_same_and_the_solution_costs_nothing() {
+        let mut torn = Torn::membrane(3, 5);
+        let n = torn.d.len();
+        let first = from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS);
+        let none: Vec<bool> = torn.bounded.iter().map(|b| !b).collect();
+        let other = from(&mut torn, vec![0.0; n], none, &LIMITS);
+        assert_eq!((other.outcome, &other.kept), (Outcome::Converged, &first.kept));
+        assert!(distance(&first.x, &other.x) < 1e-5 * dot(&first.x, &first.x).sqrt());
+        let limits = Limits { reference: Some(dot(&torn.d, &torn.d).sqrt()), ..LIMITS };
+        let again = from(&mut torn, first.x, first.kept, &limits);
+        assert_eq!(again.outcome, Outcome::Converged);
+        assert!(again.statistics.hessian <= 2, "{:?}", again.statistics);
+    }
+
+    #[test]
+    fn norm_of_a_dual_problem() {
+        let mut torn = Torn::membrane(3, 5);
+        let n = torn.d.len();
+        torn.restrict(&vec![true; n]);
+        let start = torn.d.clone();
+        let found = power::norm(&Plain, &mut torn, &start).expect("an estimate");
+        assert!(found.products <= 12);
+    }
+
+    #[test]
+    fn faults_end_as_outcomes() {
+        let mut torn = Torn::membrane(3, 5);
+        let n = torn.d.len();
+        let limits = Limits { products: 5, ..LIMITS };
+        assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &limits).outcome, Outcome::LimitReached);
+        assert_eq!(from(&mut torn, vec![0.0; n], vec![false; n], &LIMITS).outcome, Outcome::Cycled);
+        torn.f.entries[3] = f64::NAN;
+        assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS).outcome, Outcome::NotFinite);
+    }
+}

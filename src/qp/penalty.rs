@@ -1,0 +1,51 @@
+//! The Hessian P A P + rho Q of the augmented Lagrangian, Q = I - P: one product with A and two projections.
+//!
+//! Preconditioned by P M P + Q / rho, which treats the two invariant subspaces apart as the Hessian does.
+
+use super::axpy;
+use super::mprgp::{Hessian, Point};
+use super::quadratic::Quadratic;
+
+/// The Hessian P A P + rho Q.
+pub(super) struct Penalised<'a> {
+    pub function: &'a mut dyn Quadratic,
+    pub penalty: f64,
+    /// Work space, as long as x.
+    pub inside: Vec<f64>,
+}
+
+impl Penalised<'_> {
+    /// Takes the rounding in Ker G out of the defect, lest the multiplier collects it, rho times enlarged.
+    pub fn clean(&mut self, point: &mut Point) {
+        self.inside.copy_from_slice(&point.defect);
+        self.function.project(&mut self.inside);
+        axpy(-1.0, &self.inside, &mut point.defect);
+        axpy(-self.penalty, &self.inside, &mut point.gradient);
+    }
+}
+
+impl Hessian for Penalised<'_> {
+    fn apply(&mut self, p: &[f64], hp: &mut [f64], defect: &mut [f64]) {
+        self.inside.copy_from_slice(p);
+        self.function.project(&mut self.inside);
+        self.function.apply(&self.inside, hp);
+        self.function.project(hp);
+        for (i, d) in defect.iter_mut().enumerate() {
+            *d = p[i] - self.inside[i];
+            hp[i] += self.penalty * *d;
+        }
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
+        self.inside.copy_from_slice(r);
+        self.function.project(&mut self.inside);
+        if !self.function.precondition(&self.inside, z) {
+            return false;
+        }
+        self.function.project(z);
+        for ((z, r), inside) in z.iter_mut().zip(r).zip(&self.inside) {
+            *z += (r - inside) / self.penalty;
+        }
+        true
+    }
+}
