@@ -17,6 +17,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLookupTable, vtkObject, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
@@ -27,7 +28,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (registers the renderer)
 
 PIXELS = (2000, 1100)
-BANDS = 12
+BANDS_PER_TICK = 2
 MOVES_TOGETHER = 1e-4
 """Copies of a node whose displacements differ by less than this part of the largest one belong to one body."""
 
@@ -147,12 +148,12 @@ def edges_of(surface):
     return edges.GetOutput()
 
 
-def line_actor(data, colour, width):
+def line_actor(data, colour, width, nearer):
     mapper = vtkPolyDataMapper()
     mapper.SetInputData(data)
     mapper.ScalarVisibilityOff()
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
-    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0, -4)
+    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0, -nearer)
     actor = vtkActor()
     actor.SetMapper(mapper)
     actor.GetProperty().SetColor(*colour)
@@ -175,8 +176,8 @@ def surface_actor(data, field, limits, colours):
     mapper.InterpolateScalarsBeforeMappingOn()
     actor = vtkActor()
     actor.SetMapper(mapper)
-    actor.GetProperty().SetAmbient(0.45)
-    actor.GetProperty().SetDiffuse(0.6)
+    actor.GetProperty().SetAmbient(0.7)
+    actor.GetProperty().SetDiffuse(0.32)
     return actor
 
 
@@ -210,7 +211,7 @@ def render(actors):
     return pixels[top:bottom, left:right]
 
 
-def compose(pixels, title, label, limits, colours, note, path):
+def compose(pixels, title, label, ticks, colours, note, path):
     height = 6.4 * pixels.shape[0] / pixels.shape[1]
     figure = plt.figure(figsize=(8, height + 0.9), dpi=250)
     total = height + 0.9
@@ -220,8 +221,8 @@ def compose(pixels, title, label, limits, colours, note, path):
     figure.text(0.02, 1 - 0.12 / total, title, fontsize=12, va="top")
     figure.text(0.02, 0.1 / total, note, fontsize=8, color="0.35", va="bottom")
     bar_axes = figure.add_axes((0.86, 0.45 / total, 0.022, (height - 0.2) / total))
-    shades = plt.cm.ScalarMappable(plt.Normalize(*limits), colours)
-    bar = figure.colorbar(shades, cax=bar_axes, ticks=np.linspace(*limits, BANDS // 2 + 1), format="%.4g")
+    shades = plt.cm.ScalarMappable(plt.Normalize(ticks[0], ticks[-1]), colours)
+    bar = figure.colorbar(shades, cax=bar_axes, ticks=ticks, format="%.4g")
     bar.set_label(label, fontsize=10)
     bar.ax.tick_params(labelsize=8)
     bar.outline.set_linewidth(0.5)
@@ -245,23 +246,23 @@ def main():
     extract.Update()
     surface = extract.GetOutput()
     outline = edges_of(surface)
-    lines = [line_actor(outline, (0.7, 0.7, 0.7), 1.5), line_actor(warped(outline, scale), (0.1, 0.1, 0.1), 2.5)]
+    lines = [line_actor(outline, (0.65, 0.65, 0.65), 1.5, 0), line_actor(warped(outline, scale), (0.1, 0.1, 0.1), 2.5, 8)]
     deformed = warped(surface, scale)
 
     length = f" [{result.units['length']}]" if result.units["length"] else ""
     stress = f" [{result.units['stress']}]" if result.units["stress"] else ""
     note = f"displacements x {scale:g}, grey: undeformed outline"
     figures = [
-        ("von_mises", "von Mises stress", f"von Mises stress{stress}", "turbo", "averaged to nodes; "),
+        ("von_mises", "Von Mises stress", f"von Mises stress{stress}", "turbo", "averaged to nodes; "),
         ("total", "Total displacement", f"total displacement{length}", "viridis", ""),
     ]
     for field, title, label, colours, remark in figures:
         values = vtk_to_numpy(surface.GetPointData().GetArray(field))
-        limits = (0.0, float(values.max()) or 1.0)
-        bands = matplotlib.colormaps[colours].resampled(BANDS)
-        pixels = render([surface_actor(deformed, field, limits, bands), *lines])
+        ticks = MaxNLocator(7).tick_values(0.0, float(values.max()) or 1.0)
+        bands = matplotlib.colormaps[colours].resampled(BANDS_PER_TICK * (len(ticks) - 1))
+        pixels = render([surface_actor(deformed, field, (ticks[0], ticks[-1]), bands), *lines])
         path = arguments.out / f"{'displacement' if field == 'total' else field}.png"
-        compose(pixels, title, label, limits, bands, remark + note, path)
+        compose(pixels, title, label, ticks, bands, remark + note, path)
         print(path)
 
 

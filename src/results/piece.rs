@@ -113,7 +113,7 @@ impl Piece {
         }
         let fields = self.point_data.iter().map(|f| (f, points)).chain(self.cell_data.iter().map(|f| (f, cells)));
         for (field, rows) in fields {
-            if field.values.len() != rows * field.components {
+            if field.components == 0 || field.values.len() != rows * field.components {
                 let (name, length, width) = (&field.name, field.values.len(), field.components);
                 return Err(format!("field {name} has {length} values for {rows} rows of {width}"));
             }
