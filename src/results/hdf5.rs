@@ -10,6 +10,7 @@
 //! Success of a write is not proof: Open MPI 4.1's collective write prints "No space left on device" and reports success
 //! to HDF5. So a file is read back after it was closed, by the same sequence of calls on a [`SharedFile::reopen`]ed one.
 
+use std::mem::ManuallyDrop;
 use std::path::Path;
 
 use hdf5_metno::types::{FixedAscii, TypeDescriptor};
@@ -25,7 +26,9 @@ use crate::comm::{Comm, all_gather_u64};
 /// A file open on every rank of `comm`: a new one to be written, or a written one to be compared. All methods are
 /// collective, and their errors, which say what failed on which rank, are the same on every rank.
 pub struct SharedFile<'a> {
-    file: File,
+    // After a failure the file stays open: closing flushes, and a flush to a full disk is something that parallel HDF5
+    // 1.10 does not survive (segmentation fault on one rank, endless waiting on another).
+    file: ManuallyDrop<File>,
     comm: &'a dyn Comm,
     task: Task,
 }
@@ -50,7 +53,7 @@ impl<'a> SharedFile<'a> {
     /// If HDF5 cannot create it.
     pub fn create(comm: &'a dyn Comm, path: &Path) -> Result<Self, String> {
         let file = agree(comm, "creating the HDF5 file", access(comm).create(path))?;
-        Ok(Self { file, comm, task: Task::Write })
+        Ok(Self { file: ManuallyDrop::new(file), comm, task: Task::Write })
     }
 
     /// Opens a file to compare it with what was to be written: the calls that wrote it now fail where it differs.
@@ -59,7 +62,7 @@ impl<'a> SharedFile<'a> {
     /// If HDF5 cannot open it.
     pub fn reopen(comm: &'a dyn Comm, path: &Path) -> Result<Self, String> {
         let file = agree(comm, "reading the file back", access(comm).open(path))?;
-        Ok(Self { file, comm, task: Task::Compare })
+        Ok(Self { file: ManuallyDrop::new(file), comm, task: Task::Compare })
     }
 
     /// Creates a group.
@@ -138,7 +141,8 @@ impl<'a> SharedFile<'a> {
     /// # Errors
     /// If HDF5 refuses or the disk is full.
     pub fn close(self) -> Result<(), String> {
-        agree(self.comm, "closing the file", self.file.close())
+        agree(self.comm, "completing the HDF5 file", self.file.flush())?;
+        agree(self.comm, "closing the HDF5 file", ManuallyDrop::into_inner(self.file).close())
     }
 
     fn dataset(&self, name: &str, create: impl FnOnce() -> hdf5_metno::Result<Dataset>) -> Result<Dataset, String> {

@@ -80,6 +80,14 @@ impl Piece {
         [self.points.len(), self.types.len(), self.connectivity.len()]
     }
 
+    /// Bytes that the arrays take in a file, and a little more.
+    pub fn bytes(&self) -> u64 {
+        const DESCRIPTIONS: usize = 4096;
+        let fields: usize = self.point_data.iter().chain(&self.cell_data).map(|field| field.values.len()).sum();
+        let numbers = 3 * self.points.len() + self.connectivity.len() + self.offsets.len() + fields;
+        (8 * numbers + self.types.len() + DESCRIPTIONS) as u64
+    }
+
     /// Names, widths and kinds of all fields: the same text on every rank.
     pub fn layout(&self) -> String {
         let describe = |fields: &[Field]| -> Vec<String> {
@@ -105,7 +113,7 @@ impl Piece {
         }
         let fields = self.point_data.iter().map(|f| (f, points)).chain(self.cell_data.iter().map(|f| (f, cells)));
         for (field, rows) in fields {
-            if field.values.len() != rows * field.components {
+            if field.components == 0 || field.values.len() != rows * field.components {
                 let (name, length, width) = (&field.name, field.values.len(), field.components);
                 return Err(format!("field {name} has {length} values for {rows} rows of {width}"));
             }

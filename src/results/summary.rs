@@ -4,8 +4,7 @@
 //! without contact has no gap) are null; so are values that are not finite. All other numbers read back to the same bits.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::fs;
 use std::path::Path;
 
 use serde::Serialize;
@@ -161,13 +160,9 @@ impl Summary {
     /// # Errors
     /// [`OutputError::Write`] on every rank; an earlier file of that name is untouched then.
     pub fn write(&self, comm: &dyn Comm, path: &Path) -> Result<(), OutputError> {
-        replace(comm, path, |temporary| {
-            on_root(comm, "writing the summary", || {
-                let mut file = BufWriter::new(File::create(temporary)?);
-                serde_json::to_writer_pretty(&mut file, self)?;
-                writeln!(file)?;
-                file.flush()
-            })
+        let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
+        replace(comm, path, text.len() as u64, |temporary| {
+            on_root(comm, "writing the summary", || fs::write(temporary, &text))
         })
     }
 }

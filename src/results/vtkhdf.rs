@@ -12,8 +12,8 @@ use super::agree::{agree, on_root, root_texts};
 use super::hdf5::SharedFile;
 use super::piece::{Field, Piece, Values};
 use super::replace::replace;
-use crate::comm::Comm;
 use crate::comm::solo::Solo;
+use crate::comm::{Comm, all_gather_u64};
 
 /// What is kept beside the fields. Rank 0's counts.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +22,15 @@ pub struct Records {
     pub provenance: Vec<(String, String)>,
     /// Group `/convergence`: the columns of a table.
     pub convergence: Vec<(String, Vec<f64>)>,
+}
+
+impl Records {
+    fn bytes(&self) -> u64 {
+        const DESCRIPTION: usize = 1024;
+        let texts: usize = self.provenance.iter().map(|(_, text)| text.len() + DESCRIPTION).sum();
+        let columns: usize = self.convergence.iter().map(|(_, column)| 8 * column.len() + DESCRIPTION).sum();
+        (texts + columns) as u64
+    }
 }
 
 /// Version of the format.
@@ -34,7 +43,8 @@ const VERSION: [i64; 2] = [2, 2];
 /// [`OutputError::Write`] if the file cannot be written; an earlier file of that name is untouched then.
 pub fn write(comm: &dyn Comm, path: &Path, piece: &Piece, records: &Records) -> Result<(), OutputError> {
     check(comm, piece).map_err(|reason| OutputError::Layout { path: path.to_owned(), reason })?;
-    replace(comm, path, |temporary| {
+    let bytes = all_gather_u64(comm, &[piece.bytes() + records.bytes()]).iter().sum();
+    replace(comm, path, bytes, |temporary| {
         if comm.size() == 1 || comm.raw_mpi().is_some() {
             return write_rows(comm, temporary, piece, &[piece.sizes()], records);
         }
