@@ -41,11 +41,11 @@ pub(crate) fn own_elements(bodies: &[BodyMesh], parts: usize, comm: &dyn Comm) -
     (Shares(counts.into_iter().map(|n| n as usize).collect()), lists)
 }
 
-/// Shares `parts` out over bodies by their number of elements, at least one each (largest remainder).
+/// Shares `parts` out over bodies: one each, the others one by one to the body that is farthest below its quota.
 fn spread(parts: usize, sizes: &[u64]) -> Vec<usize> {
     let total: u64 = sizes.iter().sum();
     let quota: Vec<f64> = sizes.iter().map(|&n| parts as f64 * n as f64 / total as f64).collect();
-    let mut result: Vec<usize> = quota.iter().map(|&q| (q as usize).max(1)).collect();
+    let mut result = vec![1; sizes.len()];
     while result.iter().sum::<usize>() < parts {
         let missing = |k: &usize| quota[*k] - result[*k] as f64;
         let next = (0..sizes.len()).max_by(|a, b| missing(a).total_cmp(&missing(b)).then(b.cmp(a)));
