@@ -19,20 +19,20 @@ impl Constraints {
     /// All rows that touch this rank's subdomains. `pairs` are the contact pairs of the whole scene. Collective.
     ///
     /// # Errors
-    /// If supports contradict each other (on the ranks that see it).
+    /// If supports contradict each other: the same error on every rank.
     pub fn new(
         comm: &dyn Comm,
         decomposition: &Decomposition,
         supports: &[Support],
         pairs: &[ContactPair],
     ) -> Result<Self, ConstraintError> {
+        dirichlet::check(comm, &decomposition.interface, supports)?;
         let contact_nodes = gather_nodes(comm, decomposition, pairs);
         let (cluster_of, clusters) = clusters(pairs);
         let own: HashMap<u64, &InterfaceNode> = decomposition.interface.iter().map(|n| (n.node, n)).collect();
         let node = |number: u64| contact_nodes.get(&number).or_else(|| own.get(&number).copied());
 
-        let keys: BTreeSet<u64> =
-            own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
+        let keys: BTreeSet<u64> = own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
         let mut result = Self {
             rows: Vec::new(),
             blocks: Vec::new(),
@@ -50,7 +50,7 @@ impl Constraints {
             let mut rows = Vec::new();
             let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
             for interface in cluster.nodes.iter().filter_map(|&number| node(number)) {
-                let fixed = dirichlet::fixed(interface, supports)?;
+                let fixed = dirichlet::fixed(interface, supports);
                 rows.extend(gluing::rows(interface));
                 rows.extend(dirichlet::rows(interface, &fixed));
                 sides.insert(interface.node, (interface, fixed));
@@ -83,7 +83,8 @@ impl Constraints {
                 self.slot_subdomain.push(part[0].subdomain);
                 let Some(own) = decomposition.own_index(part[0].subdomain) else { continue };
                 for term in part {
-                    let local = decomposition.subdomains[own].local_node(term.node).expect("a copy is in its subdomain");
+                    let local =
+                        decomposition.subdomains[own].local_node(term.node).expect("a copy is in its subdomain");
                     let dof = (3 * local + term.axis) as u32;
                     self.entries[own].push(Entry { row: number, slot, dof, value: term.value });
                 }
