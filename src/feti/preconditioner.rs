@@ -87,3 +87,6 @@ impl<'a> Preconditioner<'a> {
         self.applications
     }
 }
+
+#[cfg(test)]
+mod tests;
