@@ -2,6 +2,7 @@
 
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Subdomain;
+use crate::mesh::surface::area_vector;
 
 /// Triangles and nodes of a surface, the same on every rank.
 pub struct GatheredSurface {
@@ -37,13 +38,9 @@ impl GatheredSurface {
         Self { nodes, points, triangles }
     }
 
-    /// Area vectors of the triangles (half the cross product of two edges).
+    /// Area vectors of the triangles.
     fn area_vectors(&self) -> impl Iterator<Item = [f64; 3]> {
-        self.triangles.iter().map(|t| {
-            let [a, b, c] = t.map(|corner| self.points[corner]);
-            let (p, q) = (difference(b, a), difference(c, a));
-            [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]].map(|x| 0.5 * x)
-        })
+        self.triangles.iter().map(|triangle| area_vector(&triangle.map(|corner| self.points[corner])))
     }
 
     /// Unit normal and share of the area (a third of the adjacent triangles) of each node.
