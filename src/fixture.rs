@@ -206,10 +206,10 @@ pub fn dense(pattern: &Pattern, values: &[f64]) -> Mat<f64> {
     let n = pattern.dofs();
     let mut matrix = Mat::zeros(n, n);
     for column in 0..n {
-        for at in pattern.column_begin[column] as usize..pattern.column_begin[column + 1] as usize {
-            let row = pattern.rows[at] as usize;
-            matrix[(row, column)] = values[at];
-            matrix[(column, row)] = values[at];
+        let range = pattern.column_begin[column] as usize..pattern.column_begin[column + 1] as usize;
+        for (&row, &value) in pattern.rows[range.clone()].iter().zip(&values[range]) {
+            matrix[(row as usize, column)] = value;
+            matrix[(column, row as usize)] = value;
         }
     }
     matrix

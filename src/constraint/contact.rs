@@ -17,9 +17,8 @@ pub(super) fn row(number: usize, pair: &ContactPair, slave: Side, master: Side) 
     let mut square = 0.0;
     for ((node, fixed), sign) in [(slave, 1.0), (master, -1.0)] {
         let weight = sign / node.copies.len() as f64;
-        for axis in 0..3 {
-            let component = pair.normal[axis];
-            match fixed[axis] {
+        for (axis, (component, held)) in pair.normal.into_iter().zip(fixed).enumerate() {
+            match held {
                 Some((_, value)) => rhs -= sign * component * value,
                 None if component == 0.0 => {}
                 None => {

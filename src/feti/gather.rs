@@ -179,7 +179,11 @@ mod tests {
                 assert_close(&column(&bu), &(&b * column(&u.concat())), 1e-14);
                 let mut torn = u.clone();
                 setup.gather.add_transpose(-2.0, &x, &mut torn);
-                assert_close(&column(&torn.concat()), &(column(&u.concat()) - 2.0 * (b.transpose() * column(&x))), 1e-14);
+                assert_close(
+                    &column(&torn.concat()),
+                    &(column(&u.concat()) - 2.0 * (b.transpose() * column(&x))),
+                    1e-14,
+                );
             });
         }
     }

@@ -76,11 +76,9 @@ fn inverse_cholesky(gram: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
         }
     }
     let mut inverse = [[0.0; 3]; 3];
-    for j in 0..3 {
-        for i in j..3 {
-            let unit = if i == j { 1.0 } else { 0.0 };
-            inverse[i][j] = (unit - (j..i).map(|k| l[i][k] * inverse[k][j]).sum::<f64>()) / l[i][i];
-        }
+    for (i, j) in (0..3).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+        let unit = if i == j { 1.0 } else { 0.0 };
+        inverse[i][j] = (unit - (j..i).map(|k| l[i][k] * inverse[k][j]).sum::<f64>()) / l[i][i];
     }
     inverse
 }
@@ -104,8 +102,7 @@ mod tests {
             }
             // Distances between any two points do not change to first order.
             for (i, j) in (0..5).flat_map(|i| (0..i).map(move |j| (i, j))) {
-                let change: f64 =
-                    (0..3).map(|a| (points[i][a] - points[j][a]) * (v[3 * i + a] - v[3 * j + a])).sum();
+                let change: f64 = (0..3).map(|a| (points[i][a] - points[j][a]) * (v[3 * i + a] - v[3 * j + a])).sum();
                 assert!(change.abs() < 1e-13);
             }
         }

@@ -70,7 +70,9 @@ mod tests {
                 bits.extend(on_ranks(&scene, ranks, |setup| {
                     let (x, y) = (setup.multipliers(1), setup.multipliers(2));
                     let products = setup.space.dots(&[(&x, &y), (&x, &x)]);
-                    assert!((products[0] - plain).abs() < 1e-14 * square && (products[1] - square).abs() < 1e-14 * square);
+                    assert!(
+                        (products[0] - plain).abs() < 1e-14 * square && (products[1] - square).abs() < 1e-14 * square
+                    );
                     products.iter().map(|p| p.to_bits()).collect::<Vec<_>>()
                 }));
             }
