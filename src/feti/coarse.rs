@@ -6,15 +6,9 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
-use faer::prelude::MatMut;
-
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Par, Side, Spec};
 use thiserror::Error;
 
+use super::cholesky::{Analysis, Lower, Workspace};
 use super::gather::Gather;
 use super::kernel::RigidModes;
 use crate::comm::{Comm, Shares, all_gather_u64};
@@ -195,9 +189,9 @@ fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
 
 /// Sparse Cholesky factor of `G G'`, whole on every rank.
 pub struct CoarseFactor {
-    symbolic: SymbolicCholesky<u32>,
+    cholesky: Analysis,
     values: Vec<f64>,
-    scratch: RefCell<MemBuffer>,
+    workspace: RefCell<Workspace>,
 }
 
 impl CoarseFactor {
@@ -219,57 +213,34 @@ impl CoarseFactor {
             values.extend(column.iter().map(|entry| entry.1));
             begins.push(rows.len() as u32);
         }
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &begins, None, &rows);
-        let symbolic =
-            factorize_symbolic_cholesky(pattern, Side::Lower, SymmetricOrdering::Amd, Default::default())
-                .expect("the coarse factor fits in memory and its index type");
-        let scratch = StackReq::any_of(&[
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
-            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
-        ]);
-        let mut scratch = MemBuffer::new(scratch);
-        let mut factor = vec![0.0; symbolic.len_val()];
-        let matrix = SparseColMatRef::new(pattern, &values[..]);
-        let regularization = LltRegularization::default();
-        let stack = MemStack::new(&mut scratch);
-        let outcome = symbolic
-            .factorize_numeric_llt(&mut factor, matrix, Side::Lower, regularization, Par::Seq, stack, Spec::default())
-            .map(|_| ());
-        // Round-off can hide a free motion: a pivot far below the largest is one.
+        let lower = Lower { column_begin: &begins, rows: &rows };
+        let cholesky = Analysis::minimum_degree(lower);
+        let mut workspace = Workspace::new([&cholesky]);
+        let mut factor = vec![0.0; cholesky.factor_length()];
+        workspace
+            .factorise(&cholesky, lower, &values, &mut factor)
+            .map_err(|breakdown| Floating { subdomain: breakdown.unknown / MODES })?;
+        let result = Self { cholesky, values: factor, workspace: RefCell::new(workspace) };
+        // Round-off can hide a free motion: the factor then answers far beyond the size of the matrix.
         let largest = values.iter().copied().fold(0.0, f64::max);
-        let result = Self { symbolic, values: factor, scratch: RefCell::new(scratch) };
-        match outcome {
-            Ok(()) => result.check_rank(largest).map(|()| result),
-            Err(LltError::NonPositivePivot { index }) => {
-                let column = result.symbolic.perm().map_or(index, |p| p.arrays().0[index] as usize);
-                Err(Floating { subdomain: column / MODES })
-            }
-        }
+        result.check_rank(n, largest).map(|()| result)
     }
 
     /// Inverse iteration from a fixed vector without a pattern: a free motion shows as a huge response.
-    fn check_rank(&self, largest: f64) -> Result<(), Floating> {
-        let n = self.symbolic.nrows();
+    fn check_rank(&self, n: usize, largest: f64) -> Result<(), Floating> {
+        let sound = |response: f64| response.abs() * largest < (n as f64).sqrt() / SINGULAR;
         let mut x: Vec<f64> = (0..n).map(|k| if (k * k + k / 3) % 7 < 3 { 1.0 } else { -1.0 }).collect();
         self.solve(&mut x);
         let worst = x.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         match worst {
-            Some((at, response)) if !(response.abs() * largest < (n as f64).sqrt() / SINGULAR) => {
-                Err(Floating { subdomain: at / MODES })
-            }
+            Some((at, response)) if !sound(*response) => Err(Floating { subdomain: at / MODES }),
             _ => Ok(()),
         }
     }
 
     /// `a = (G G')^-1 a`, six numbers a subdomain. Local.
     pub fn solve(&self, a: &mut [f64]) {
-        let n = a.len();
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(a, n, 1),
-            Par::Seq,
-            MemStack::new(&mut self.scratch.borrow_mut()),
-        );
+        self.workspace.borrow_mut().solve(&self.cholesky, &self.values, a);
     }
 }
 

@@ -6,18 +6,9 @@
 
 use std::rc::Rc;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::perm::PermRef;
-use faer::prelude::MatMut;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Par, Side, Spec};
 use thiserror::Error;
 
+use super::cholesky::{Analysis, Lower, Workspace};
 use super::kernel::RigidModes;
 use super::ordering::nested_dissection;
 use crate::assembly::pattern::Pattern;
@@ -49,7 +40,7 @@ pub struct Symbolic {
     pub order: Vec<u32>,
     /// Local fixing nodes.
     fixing: Vec<u32>,
-    cholesky: SymbolicCholesky<u32>,
+    cholesky: Analysis,
 }
 
 impl Symbolic {
@@ -57,20 +48,9 @@ impl Symbolic {
     pub fn new(subdomain: &Subdomain) -> Self {
         let fixing = fixing_nodes(&subdomain.points);
         let pattern = Pattern::new(subdomain.nodes.len(), &subdomain.elements, &fixing);
-        let n = pattern.dofs();
-        let (forward, inverse) = nested_dissection(&pattern.adjacency);
-        let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let cholesky = factorize_symbolic_cholesky(
-            SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_begin, None, &pattern.rows),
-            Side::Lower,
-            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, n)),
-            params,
-        )
-        .expect("a subdomain's factor fits in memory and its index type");
-        Self { pattern, order: forward, fixing, cholesky }
+        let order = nested_dissection(&pattern.adjacency);
+        let cholesky = Analysis::ordered(lower(&pattern), &order);
+        Self { pattern, order, fixing, cholesky }
     }
 
     /// Whether a subdomain may share this analysis.
@@ -80,8 +60,12 @@ impl Symbolic {
 
     /// Doubles in the factor.
     pub fn factor_length(&self) -> usize {
-        self.cholesky.len_val()
+        self.cholesky.factor_length()
     }
+}
+
+fn lower(pattern: &Pattern) -> Lower<'_> {
+    Lower { column_begin: &pattern.column_begin, rows: &pattern.rows }
 }
 
 /// Analyses all subdomains, sharing among those of equal connectivity.
@@ -105,26 +89,16 @@ pub fn analyse(subdomains: &[Subdomain]) -> Vec<Rc<Symbolic>> {
 pub struct Factors {
     symbolic: Vec<Rc<Symbolic>>,
     values: Vec<Vec<f64>>,
-    scratch: MemBuffer,
+    workspace: Workspace,
     shifted: Vec<f64>,
 }
 
 impl Factors {
     /// Space for the factors; nothing is factorised yet.
     pub fn new(symbolic: Vec<Rc<Symbolic>>) -> Self {
-        let scratch = faer::dyn_stack::StackReq::any_of(
-            &symbolic
-                .iter()
-                .flat_map(|s| {
-                    [
-                        s.cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
-                        s.cholesky.solve_in_place_scratch::<f64>(1, Par::Seq),
-                    ]
-                })
-                .collect::<Vec<_>>(),
-        );
-        let values = symbolic.iter().map(|s| vec![0.0; s.cholesky.len_val()]).collect();
-        Self { symbolic, values, scratch: MemBuffer::new(scratch), shifted: Vec::new() }
+        let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
+        let values = symbolic.iter().map(|s| vec![0.0; s.factor_length()]).collect();
+        Self { symbolic, values, workspace, shifted: Vec::new() }
     }
 
     /// Symbolic analysis of an own subdomain.
@@ -144,37 +118,18 @@ impl Factors {
         let diagonal = pattern.diagonal(stiffness);
         let rho = diagonal.iter().sum::<f64>() / n as f64;
         add_fixing(pattern, fixing, &subdomain.points, rho, &mut self.shifted);
-        let matrix = SparseColMatRef::new(
-            SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_begin, None, &pattern.rows),
-            &self.shifted[..],
-        );
         let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
         if !rho.is_finite() {
             return Err(refuse(0));
         }
-        cholesky
-            .factorize_numeric_llt(
-                &mut self.values[own],
-                matrix,
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut self.scratch),
-                Spec::default(),
-            )
-            .map(|_| ())
-            .map_err(|faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index }| refuse(index))
+        self.workspace
+            .factorise(cholesky, lower(pattern), &self.shifted, &mut self.values[own])
+            .map_err(|breakdown| refuse(breakdown.place))
     }
 
     /// `x = K^+ x` for one own subdomain.
     pub fn solve(&mut self, own: usize, x: &mut [f64]) {
-        let n = x.len();
-        LltRef::new(&self.symbolic[own].cholesky, &self.values[own]).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(x, n, 1),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-        );
+        self.workspace.solve(&self.symbolic[own].cholesky, &self.values[own], x);
     }
 }
 

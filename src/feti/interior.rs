@@ -2,17 +2,7 @@
 
 use std::rc::Rc;
 
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::perm::PermRef;
-use faer::prelude::MatMut;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Par, Side, Spec};
-
+use super::cholesky::{Analysis, Lower, Workspace};
 use super::factor::{NotDefinite, Symbolic};
 use crate::assembly::pattern::Pattern;
 
@@ -26,7 +16,7 @@ pub struct InteriorSymbolic {
     rows: Vec<u32>,
     /// Where each entry stands among the values of the whole matrix.
     positions: Vec<u32>,
-    cholesky: SymbolicCholesky<u32>,
+    cholesky: Analysis,
 }
 
 impl InteriorSymbolic {
@@ -49,21 +39,8 @@ impl InteriorSymbolic {
             column_begin.push(rows.len() as u32);
         }
         // The whole matrix' nested dissection, without the boundary.
-        let n = interior.len();
-        let forward: Vec<u32> =
-            whole.order.iter().map(|&dof| place[dof as usize]).filter(|&k| k != u32::MAX).collect();
-        let mut inverse = vec![0; n];
-        forward.iter().enumerate().for_each(|(new, &old)| inverse[old as usize] = new as u32);
-        let cholesky = factorize_symbolic_cholesky(
-            SymbolicSparseColMatRef::new_checked(n, n, &column_begin, None, &rows),
-            Side::Lower,
-            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, n)),
-            CholeskySymbolicParams {
-                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-                ..Default::default()
-            },
-        )
-        .expect("an interior factor is smaller than the whole one");
+        let order: Vec<u32> = whole.order.iter().map(|&dof| place[dof as usize]).filter(|&k| k != u32::MAX).collect();
+        let cholesky = Analysis::ordered(Lower { column_begin: &column_begin, rows: &rows }, &order);
         Self { boundary, interior, column_begin, rows, positions, cholesky }
     }
 }
@@ -85,22 +62,16 @@ pub fn analyse(whole: &[Rc<Symbolic>], boundaries: Vec<Vec<u32>>) -> Vec<Rc<Inte
 pub struct InteriorFactors {
     symbolic: Vec<Rc<InteriorSymbolic>>,
     values: Vec<Vec<f64>>,
-    scratch: MemBuffer,
+    workspace: Workspace,
     block: Vec<f64>,
 }
 
 impl InteriorFactors {
     /// Space for the factors.
     pub fn new(symbolic: Vec<Rc<InteriorSymbolic>>) -> Self {
-        let request = |s: &Rc<InteriorSymbolic>| {
-            StackReq::or(
-                s.cholesky.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
-                s.cholesky.solve_in_place_scratch::<f64>(1, Par::Seq),
-            )
-        };
-        let scratch = MemBuffer::new(StackReq::any_of(&symbolic.iter().map(request).collect::<Vec<_>>()));
-        let values = symbolic.iter().map(|s| vec![0.0; s.cholesky.len_val()]).collect();
-        Self { symbolic, values, scratch, block: Vec::new() }
+        let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
+        let values = symbolic.iter().map(|s| vec![0.0; s.cholesky.factor_length()]).collect();
+        Self { symbolic, values, workspace, block: Vec::new() }
     }
 
     /// Which unknowns of an own subdomain are interior.
@@ -114,22 +85,11 @@ impl InteriorFactors {
     /// If it is not positive definite; `subdomain` is named in the message.
     pub fn factorise(&mut self, own: usize, subdomain: usize, stiffness: &[f64]) -> Result<(), NotDefinite> {
         let InteriorSymbolic { interior, column_begin, rows, positions, cholesky, .. } = &*self.symbolic[own];
-        let n = interior.len();
         self.block.clear();
         self.block.extend(positions.iter().map(|&at| stiffness[at as usize]));
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, column_begin, None, rows);
-        cholesky
-            .factorize_numeric_llt(
-                &mut self.values[own],
-                SparseColMatRef::new(pattern, &self.block[..]),
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut self.scratch),
-                Spec::default(),
-            )
-            .map(|_| ())
-            .map_err(|_| NotDefinite { subdomain, pivot: 0, dofs: n })
+        self.workspace
+            .factorise(cholesky, Lower { column_begin, rows }, &self.block, &mut self.values[own])
+            .map_err(|breakdown| NotDefinite { subdomain, pivot: breakdown.place, dofs: interior.len() })
     }
 
     /// Replaces the interior part of `u`, zero on entry, by the one that is in equilibrium with its boundary part:
@@ -139,13 +99,7 @@ impl InteriorFactors {
         let mut forces = vec![0.0; u.len()];
         pattern.multiply_add(values, u, &mut forces);
         let mut inside: Vec<f64> = interior.iter().map(|&dof| -forces[dof as usize]).collect();
-        let n = inside.len();
-        LltRef::new(cholesky, &self.values[own]).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(&mut inside, n, 1),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-        );
+        self.workspace.solve(cholesky, &self.values[own], &mut inside);
         interior.iter().zip(&inside).for_each(|(&dof, x)| u[dof as usize] = *x);
     }
 }

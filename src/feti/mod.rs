@@ -3,11 +3,12 @@
 //! Notation of the paper: `K` block diagonal stiffness, `B` constraint rows, `R` rigid modes, `G = R'B'`,
 //! `F = B K^+ B'`, `P` the projector onto `Ker G`. Each symbol has a file; none knows of optimisation.
 
+pub mod cholesky;
 pub mod coarse;
 pub mod factor;
 pub mod gather;
-pub mod kernel;
 pub mod interior;
+pub mod kernel;
 pub mod operator;
 pub mod ordering;
 pub mod preconditioner;

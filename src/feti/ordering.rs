@@ -2,11 +2,11 @@
 
 use crate::decomposition::metis::alone;
 
-/// `(new -> old, old -> new)` numbering of the unknowns, from the adjacency of the nodes.
+/// The unknown at each place of the elimination, from the adjacency of the nodes.
 ///
 /// # Panics
 /// If METIS refuses the graph: a bug, since the adjacency is symmetric and free of loops.
-pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>)) -> (Vec<u32>, Vec<u32>) {
+pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>)) -> Vec<u32> {
     let (begins, neighbours) = adjacency;
     let nodes = begins.len() - 1;
     let mut count = nodes as metis_sys::idx_t;
@@ -25,6 +25,5 @@ pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>)) -> (Vec<u32>, Vec<u32
         )
     };
     assert_eq!(status, metis_sys::rstatus_et_METIS_OK, "METIS orders a valid graph");
-    let expand = |nodes: &[i32]| nodes.iter().flat_map(|&n| (0..3).map(move |a| 3 * n as u32 + a)).collect();
-    (expand(&forward), expand(&inverse))
+    forward.iter().flat_map(|&n| (0..3).map(move |a| 3 * n as u32 + a)).collect()
 }
