@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand};
 use thiserror::Error;
 
-use crate::comm::{Comm, ordered_sum, Shares};
+use crate::comm::{Comm, Shares, ordered_sum};
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
@@ -113,6 +113,9 @@ pub enum Failure {
     /// The scene file cannot be read.
     #[error("{0}")]
     Input(String),
+    /// The place for results is refused before anything is computed.
+    #[error("{0}")]
+    Place(OutputError),
     /// Results cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -123,7 +126,7 @@ impl Failure {
     pub fn code(&self) -> i32 {
         match self {
             Self::Scene(_) | Self::Study(_) => 65,
-            Self::Input(_) | Self::Output(_) => 74,
+            Self::Input(_) | Self::Place(_) | Self::Output(_) => 74,
         }
     }
 }
@@ -177,7 +180,8 @@ fn load(source: &Source, sets: &[String], comm: &dyn Comm) -> Result<Scene, Fail
 
 /// How results of a scene are called: its name, or the stem of its file, and the level if there is one.
 fn run_name(source: &Source) -> String {
-    let stem = Path::new(&source.scene).file_stem().map_or_else(|| source.scene.clone(), |s| s.to_string_lossy().into());
+    let stem =
+        Path::new(&source.scene).file_stem().map_or_else(|| source.scene.clone(), |s| s.to_string_lossy().into());
     if source.level == 1 { stem } else { format!("{stem}-level{}", source.level) }
 }
 
@@ -193,7 +197,7 @@ fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     let result = out.join(format!("{}.vtkhdf", run_name(&source)));
     let summary_file = source.summary.clone().unwrap_or_else(|| out.join(format!("{}.json", run_name(&source))));
     for file in [&result, &summary_file] {
-        replace::probe(comm, file)?;
+        replace::probe(comm, file).map_err(Failure::Place)?;
     }
 
     let discrete = timer.time("discretisation", || study::discretise(&scene, comm))?;
@@ -229,7 +233,7 @@ fn check(source: &Source, comm: &dyn Comm) -> Result<i32, Failure> {
     let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
     let scene = load(source, &source.sets, comm)?;
     if let Some(file) = &source.summary {
-        replace::probe(comm, file)?;
+        replace::probe(comm, file).map_err(Failure::Place)?;
     }
     let discrete = study::discretise(&scene, comm)?;
     let sizes = study::sizes(&discrete, comm);
@@ -257,7 +261,11 @@ fn warnings(scene: &Scene, discrete: &study::Discrete, comm: &dyn Comm) -> Vec<S
     let mut warnings = scene.warnings();
     let subdomains = discrete.decomposition.shares.total();
     if subdomains < comm.size() {
-        warnings.push(format!("{} of {} ranks stay idle: there are only {subdomains} subdomains", comm.size() - subdomains, comm.size()));
+        warnings.push(format!(
+            "{} of {} ranks stay idle: there are only {subdomains} subdomains",
+            comm.size() - subdomains,
+            comm.size()
+        ));
     }
     warnings
 }

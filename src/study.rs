@@ -160,7 +160,9 @@ pub fn memory_estimate_mb(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -
     let factors = if scene.solver.preconditioner == scene::Preconditioner::Dirichlet { 1.35 } else { 1.0 };
     let doubles: f64 = analysed
         .iter()
-        .map(|s| factors * s.factor_length() as f64 + 1.5 * s.pattern.rows.len() as f64 + 12.0 * s.pattern.dofs() as f64)
+        .map(|s| {
+            factors * s.factor_length() as f64 + 1.5 * s.pattern.rows.len() as f64 + 12.0 * s.pattern.dofs() as f64
+        })
         .sum();
     // A row of G' and a row's terms; the coarse factor is small beside them.
     let slots = 12.0 * constraints.slot_subdomain.len() as f64;
@@ -198,8 +200,7 @@ pub fn solve(
     let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
     let space = RowSpace::new(comm, shares, constraints);
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
-    let coarse =
-        timer.time("coarse set-up", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
+    let coarse = timer.time("coarse set-up", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
     let interior = || {
         let boundaries = preconditioner::boundaries(&gather, subdomains.len());
@@ -235,12 +236,16 @@ pub fn solve(
             scene::Expansion::Fixed => Expansion::Fixed,
         },
     };
-    let settings =
-        Settings { tolerance: solver.newton_tolerance, residual: solver.residual_tolerance, limit: solver.newton_limit };
+    let settings = Settings {
+        tolerance: solver.newton_tolerance,
+        residual: solver.residual_tolerance,
+        limit: solver.newton_limit,
+    };
     let operator = DualOperator::new(Factors::new(symbolic), &gather);
     let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, step, subdomains.len());
-    let solution =
-        newton::solve(&problem, &mut steps, &settings, timer, &mut |record| report(Event::NewtonStep(newton_row(record))));
+    let solution = newton::solve(&problem, &mut steps, &settings, timer, &mut |record| {
+        report(Event::NewtonStep(newton_row(record)))
+    });
 
     let contact = contact_states(&problem, &solution);
     let piece = fields::piece(decomposition, &discrete.materials, &solution.u, &discrete.pairs, &contact, comm.rank());

@@ -31,8 +31,7 @@ impl Constraints {
         let own: HashMap<u64, &InterfaceNode> = decomposition.interface.iter().map(|n| (n.node, n)).collect();
         let node = |number: u64| contact_nodes.get(&number).or_else(|| own.get(&number).copied());
 
-        let keys: BTreeSet<u64> =
-            own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
+        let keys: BTreeSet<u64> = own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
         let mut result = Self {
             rows: Vec::new(),
             blocks: Vec::new(),
@@ -83,7 +82,8 @@ impl Constraints {
                 self.slot_subdomain.push(part[0].subdomain);
                 let Some(own) = decomposition.own_index(part[0].subdomain) else { continue };
                 for term in part {
-                    let local = decomposition.subdomains[own].local_node(term.node).expect("a copy is in its subdomain");
+                    let local =
+                        decomposition.subdomains[own].local_node(term.node).expect("a copy is in its subdomain");
                     let dof = (3 * local + term.axis) as u32;
                     self.entries[own].push(Entry { row: number, slot, dof, value: term.value });
                 }

@@ -75,7 +75,8 @@ impl<'a> Grid<'a> {
         let steps = (reach / self.spacing).ceil() as i64 + 1;
         (0..=steps).flat_map(|k| [k, -k]).find_map(|k| {
             let at: [f64; 3] = std::array::from_fn(|a| point[a] + k as f64 * self.spacing * normal[a]);
-            let outside = |a: usize| at[a] < self.low[a] - 2.0 * self.spacing || at[a] > self.high[a] + 2.0 * self.spacing;
+            let outside =
+                |a: usize| at[a] < self.low[a] - 2.0 * self.spacing || at[a] > self.high[a] + 2.0 * self.spacing;
             if (0..3).any(outside) { None } else { self.nearby(point, normal, at) }
         })
     }

@@ -43,8 +43,10 @@ pub enum ContactError {
         slaves: usize,
     },
     /// The surfaces do not face each other anywhere.
-    #[error("contact.{name}: no node of the slave surface has the master surface opposite along its normal; \
-             check the names of the surfaces and the positions of the bodies")]
+    #[error(
+        "contact.{name}: no node of the slave surface has the master surface opposite along its normal; \
+             check the names of the surfaces and the positions of the bodies"
+    )]
     Apart {
         /// Name of the contact in the scene.
         name: String,

@@ -54,7 +54,8 @@ impl Subdomain {
         let facets = outer
             .into_iter()
             .filter_map(|triangle| {
-                let on = |face: Face| triangle.iter().all(|&n| brick.is_on(face, brick.node_position(nodes[n as usize])));
+                let on =
+                    |face: Face| triangle.iter().all(|&n| brick.is_on(face, brick.node_position(nodes[n as usize])));
                 let surface = surfaces.iter().position(|s| s.body == body_index && on(s.face))?;
                 Some(Facet { surface, nodes: triangle })
             })

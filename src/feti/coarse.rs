@@ -220,9 +220,8 @@ impl CoarseFactor {
             begins.push(rows.len() as u32);
         }
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &begins, None, &rows);
-        let symbolic =
-            factorize_symbolic_cholesky(pattern, Side::Lower, SymmetricOrdering::Amd, Default::default())
-                .expect("the coarse factor fits in memory and its index type");
+        let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, SymmetricOrdering::Amd, Default::default())
+            .expect("the coarse factor fits in memory and its index type");
         let scratch = StackReq::any_of(&[
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),

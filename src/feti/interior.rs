@@ -50,8 +50,7 @@ impl InteriorSymbolic {
         }
         // The whole matrix' nested dissection, without the boundary.
         let n = interior.len();
-        let forward: Vec<u32> =
-            whole.order.iter().map(|&dof| place[dof as usize]).filter(|&k| k != u32::MAX).collect();
+        let forward: Vec<u32> = whole.order.iter().map(|&dof| place[dof as usize]).filter(|&k| k != u32::MAX).collect();
         let mut inverse = vec![0; n];
         forward.iter().enumerate().for_each(|(new, &old)| inverse[old as usize] = new as u32);
         let cholesky = factorize_symbolic_cholesky(

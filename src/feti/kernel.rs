@@ -104,8 +104,7 @@ mod tests {
             }
             // Distances between any two points do not change to first order.
             for (i, j) in (0..5).flat_map(|i| (0..i).map(move |j| (i, j))) {
-                let change: f64 =
-                    (0..3).map(|a| (points[i][a] - points[j][a]) * (v[3 * i + a] - v[3 * j + a])).sum();
+                let change: f64 = (0..3).map(|a| (points[i][a] - points[j][a]) * (v[3 * i + a] - v[3 * j + a])).sum();
                 assert!(change.abs() < 1e-13);
             }
         }

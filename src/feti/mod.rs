@@ -6,8 +6,8 @@
 pub mod coarse;
 pub mod factor;
 pub mod gather;
-pub mod kernel;
 pub mod interior;
+pub mod kernel;
 pub mod operator;
 pub mod ordering;
 pub mod preconditioner;

@@ -38,7 +38,15 @@ impl<'a> Preconditioner<'a> {
     pub fn new(gather: &'a Gather<'a>, interior: Option<InteriorFactors>) -> Self {
         let torn = gather.zeros();
         let boundary = boundaries(gather, torn.len());
-        Self { gather, interior, scaling: Scaling::default(), boundary, rows: vec![0.0; gather.rows()], torn, applications: 0 }
+        Self {
+            gather,
+            interior,
+            scaling: Scaling::default(),
+            boundary,
+            rows: vec![0.0; gather.rows()],
+            torn,
+            applications: 0,
+        }
     }
 
     /// `y = B_D S B_D' x`, `stiffness(own)` being the sparsity and the lower values. One neighbour exchange.

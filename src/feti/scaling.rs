@@ -22,7 +22,12 @@ pub struct Scaling {
 impl Scaling {
     /// From the diagonals of the own subdomains' stiffness matrices; rows that are not `kept` get zero rows. One
     /// neighbour exchange.
-    pub fn new(constraints: &Constraints, gather: &Gather, diagonals: &[Vec<f64>], kept: impl Fn(usize) -> bool) -> Self {
+    pub fn new(
+        constraints: &Constraints,
+        gather: &Gather,
+        diagonals: &[Vec<f64>],
+        kept: impl Fn(usize) -> bool,
+    ) -> Self {
         let flexibility: Vec<Vec<f64>> = diagonals.iter().map(|d| d.iter().map(|x| 1.0 / x).collect()).collect();
         // Every slot belongs to one node of its subdomain: three numbers tell the flexibility there.
         let mut of_slot = vec![[0.0; 3]; constraints.slot_subdomain.len()];

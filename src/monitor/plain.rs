@@ -28,7 +28,9 @@ impl Plain {
     fn lines(&mut self, event: &Event) -> Vec<String> {
         match event {
             Event::Sizes { scene, level, ranks, sizes } => size_lines(scene, *level, *ranks, sizes),
-            Event::Memory { megabytes } => vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together", "memory estimate")],
+            Event::Memory { megabytes } => {
+                vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together", "memory estimate")]
+            }
             Event::NewtonStep(row) => {
                 let header = (!std::mem::replace(&mut self.newton_header_written, true)).then(newton_header);
                 header.into_iter().chain([newton_line(row)]).collect()

@@ -82,7 +82,8 @@ pub fn largest_von_mises(decomposition: &Decomposition, materials: &[Material], 
 
 /// Von Mises stress and equivalent plastic strain of an element, one step from rest.
 fn element_state(subdomain: &Subdomain, material: &Material, nodes: &[u32; 4], u: &[f64]) -> (f64, f64) {
-    let element = Tet4::new(&nodes.map(|n| subdomain.points[n as usize])).expect("elements of a checked mesh have volume");
+    let element =
+        Tet4::new(&nodes.map(|n| subdomain.points[n as usize])).expect("elements of a checked mesh have volume");
     let strain = element.strain(&std::array::from_fn(|k| u[3 * nodes[k / 3] as usize + k % 3]));
     let response = material.respond(&strain, &History::default());
     (tensor::von_mises(&response.stress), response.kappa)

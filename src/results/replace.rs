@@ -48,7 +48,8 @@ pub fn replace(
 pub fn probe(comm: &dyn Comm, path: &Path) -> Result<(), OutputError> {
     let temporary = temporary_name(path);
     let attempt = || create(&temporary, 0).and_then(|()| fs::remove_file(&temporary));
-    on_root(comm, "trying the directory", attempt).map_err(|reason| OutputError::Write { path: path.to_owned(), reason })
+    on_root(comm, "trying the directory", attempt)
+        .map_err(|reason| OutputError::Write { path: path.to_owned(), reason })
 }
 
 fn temporary_name(path: &Path) -> PathBuf {
