@@ -24,4 +24,6 @@ pub mod study;
 pub mod tensor;
 
 #[cfg(test)]
+mod fixture;
+#[cfg(test)]
 mod random;

@@ -19,3 +19,6 @@ fn geometry(subdomain: &Subdomain, nodes: &[u32; 4]) -> Tet4 {
 fn displacements(u: &[f64], nodes: &[u32; 4]) -> [f64; 12] {
     std::array::from_fn(|k| u[3 * nodes[k / 3] as usize + k % 3])
 }
+
+#[cfg(test)]
+mod tests;

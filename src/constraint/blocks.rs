@@ -19,13 +19,14 @@ impl Constraints {
     /// All rows that touch this rank's subdomains. `pairs` are the contact pairs of the whole scene. Collective.
     ///
     /// # Errors
-    /// If supports contradict each other (on the ranks that see it).
+    /// If supports contradict each other: the same error on every rank.
     pub fn new(
         comm: &dyn Comm,
         decomposition: &Decomposition,
         supports: &[Support],
         pairs: &[ContactPair],
     ) -> Result<Self, ConstraintError> {
+        dirichlet::check(comm, &decomposition.interface, supports)?;
         let contact_nodes = gather_nodes(comm, decomposition, pairs);
         let (cluster_of, clusters) = clusters(pairs);
         let own: HashMap<u64, &InterfaceNode> = decomposition.interface.iter().map(|n| (n.node, n)).collect();
@@ -49,7 +50,7 @@ impl Constraints {
             let mut rows = Vec::new();
             let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
             for interface in cluster.nodes.iter().filter_map(|&number| node(number)) {
-                let fixed = dirichlet::fixed(interface, supports)?;
+                let fixed = dirichlet::fixed(interface, supports);
                 rows.extend(gluing::rows(interface));
                 rows.extend(dirichlet::rows(interface, &fixed));
                 sides.insert(interface.node, (interface, fixed));

@@ -1,36 +1,45 @@
 //! Support rows: the mean over a node's copies has a prescribed value.
 
 use super::{ConstraintError, Kind, Row, Support, Term};
+use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::InterfaceNode;
 
 /// For each component, the support that fixes it at a node, and the value.
+pub(super) fn fixed(node: &InterfaceNode, supports: &[Support]) -> [Option<(usize, f64)>; 3] {
+    [0, 1, 2].map(|axis| at(node, supports, axis).next())
+}
+
+/// The supports that fix a component at a node, and their values.
+fn at(node: &InterfaceNode, supports: &[Support], axis: usize) -> impl Iterator<Item = (usize, f64)> {
+    let holds = move |s: &Support| s.fixed[axis] && node.surfaces.contains(&(s.surface as u32));
+    supports.iter().enumerate().filter(move |(_, s)| holds(s)).map(move |(index, s)| (index, s.displacement[axis]))
+}
+
+/// Whether supports agree wherever they meet. Collective.
 ///
 /// # Errors
-/// If two supports prescribe different values there.
-pub(super) fn fixed(node: &InterfaceNode, supports: &[Support]) -> Result<[Option<(usize, f64)>; 3], ConstraintError> {
-    let mut result: [Option<(usize, f64)>; 3] = [None; 3];
-    for (index, support) in supports.iter().enumerate() {
-        if !node.surfaces.contains(&(support.surface as u32)) {
-            continue;
-        }
-        for axis in (0..3).filter(|&a| support.fixed[a]) {
-            let value = support.displacement[axis];
-            match result[axis] {
-                None => result[axis] = Some((index, value)),
-                Some((_, other)) if other == value => {}
-                Some((first, other)) => {
-                    return Err(ConstraintError::Conflict {
-                        first: supports[first].name.clone(),
-                        second: support.name.clone(),
-                        axis: ['x', 'y', 'z'][axis],
-                        first_value: other,
-                        second_value: value,
-                    });
-                }
-            }
-        }
-    }
-    Ok(result)
+/// If two of them prescribe different values at one node: on every rank, that of the lowest such node.
+pub(super) fn check(comm: &dyn Comm, nodes: &[InterfaceNode], supports: &[Support]) -> Result<(), ConstraintError> {
+    let conflict = |node: &InterfaceNode| {
+        (0..3).find_map(|axis| {
+            let mut values = at(node, supports, axis);
+            let first = values.next()?;
+            let second = values.find(|other| other.1 != first.1)?;
+            Some([node.node, first.0 as u64, second.0 as u64, axis as u64])
+        })
+    };
+    let mine = nodes.iter().find_map(conflict);
+    let all = all_gather_u64(comm, mine.as_slice().as_flattened());
+    let Some(lowest) = all.chunks_exact(4).min() else { return Ok(()) };
+    let (first, second) = (&supports[lowest[1] as usize], &supports[lowest[2] as usize]);
+    let axis = lowest[3] as usize;
+    Err(ConstraintError::Conflict {
+        first: first.name.clone(),
+        second: second.name.clone(),
+        axis: ['x', 'y', 'z'][axis],
+        first_value: first.displacement[axis],
+        second_value: second.displacement[axis],
+    })
 }
 
 /// One row for each fixed component: `sum of copies / sqrt(m) = sqrt(m) value`.

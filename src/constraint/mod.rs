@@ -138,3 +138,6 @@ pub enum ConstraintError {
         second_value: f64,
     },
 }
+
+#[cfg(test)]
+mod tests;

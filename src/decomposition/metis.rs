@@ -1,6 +1,8 @@
 //! Partition of each body's dual graph by METIS (Karypis and Kumar 1998), on rank 0; the others receive the numbers of
 //! their own elements. Bodies are cut one by one: a part never spans two bodies.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use metis::Graph;
 use metis::option::{Contig, Seed};
 
@@ -41,11 +43,18 @@ pub(crate) fn own_elements(bodies: &[BodyMesh], parts: usize, comm: &dyn Comm) -
     (Shares(counts.into_iter().map(|n| n as usize).collect()), lists)
 }
 
-/// Shares `parts` out over bodies by their number of elements, at least one each (largest remainder).
+/// Lets one thread at a time into METIS, which draws from the C library's one generator: without it, results would depend
+/// on what other threads do.
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
+    static LOCK: Mutex<()> = Mutex::new(());
+    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Shares `parts` out over bodies: one each, the others one by one to the body that is farthest below its quota.
 fn spread(parts: usize, sizes: &[u64]) -> Vec<usize> {
     let total: u64 = sizes.iter().sum();
     let quota: Vec<f64> = sizes.iter().map(|&n| parts as f64 * n as f64 / total as f64).collect();
-    let mut result: Vec<usize> = quota.iter().map(|&q| (q as usize).max(1)).collect();
+    let mut result = vec![1; sizes.len()];
     while result.iter().sum::<usize>() < parts {
         let missing = |k: &usize| quota[*k] - result[*k] as f64;
         let next = (0..sizes.len()).max_by(|a, b| missing(a).total_cmp(&missing(b)).then(b.cmp(a)));
@@ -64,6 +73,7 @@ fn partition(body: &BodyMesh, wanted: usize) -> (Vec<i32>, usize) {
     let (begin, neighbours) = (dual.xadj(), dual.adjncy());
     let mut parts = vec![0; elements as usize];
     if wanted > 1 {
+        let _alone = alone();
         Graph::new(1, wanted as i32, begin, neighbours)
             .expect("METIS made this graph itself")
             .set_option(Contig(true))

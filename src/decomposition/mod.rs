@@ -108,3 +108,6 @@ pub fn even_shares(items: usize, ranks: usize) -> Shares {
 
 /// Elements of one subdomain: its body, and the numbers of its elements within the body, ascending.
 pub(crate) type ElementList = (usize, Vec<u64>);
+
+#[cfg(test)]
+mod tests;

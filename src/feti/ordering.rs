@@ -1,5 +1,7 @@
 //! Fill-reducing ordering by METIS nested dissection of the node graph, three unknowns a node.
 
+use crate::decomposition::metis::alone;
+
 /// `(new -> old, old -> new)` numbering of the unknowns, from the adjacency of the nodes.
 ///
 /// # Panics
@@ -9,6 +11,7 @@ pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>)) -> (Vec<u32>, Vec<u32
     let nodes = begins.len() - 1;
     let mut count = nodes as metis_sys::idx_t;
     let (mut forward, mut inverse) = (vec![0; nodes], vec![0; nodes]);
+    let _alone = alone();
     // Safety: METIS reads the graph and writes `count` entries to each permutation; pointers and lengths agree.
     let status = unsafe {
         metis_sys::METIS_NodeND(

@@ -1,0 +1,178 @@
+use super::loads::{Traction, add_tractions};
+use super::{internal, stiffness};
+use crate::assembly::pattern::Pattern;
+use crate::decomposition::Subdomain;
+use crate::fixture::{
+    assert_close, block_diagonal, built_in, column, dense, elastic, on_ranks, same_on_any_ranks, two_bricks,
+    two_bricks_by_metis,
+};
+use crate::material::Material;
+use crate::material::samples::STEEL;
+use crate::random::Random;
+use crate::scene::Scene;
+
+/// A brick cut into boxes and into METIS parts, and a rod of one part.
+fn shapes() -> [Scene; 3] {
+    [
+        two_bricks(&[]),
+        two_bricks_by_metis(7),
+        built_in("bar", &["body.bar.brick.cells=[40, 1, 1]", "decomposition.cells=[40, 1, 1]"]),
+    ]
+}
+
+fn pattern_of(subdomain: &Subdomain) -> Pattern {
+    Pattern::new(subdomain.nodes.len(), &subdomain.elements, &[])
+}
+
+/// `u(x) = strain` field with random constant gradients of this size.
+fn linear_field(subdomain: &Subdomain, size: f64) -> Vec<f64> {
+    let gradient: [[f64; 3]; 3] = std::array::from_fn(|a| Random::new(a as u64).vector(size));
+    let at = |p: &[f64; 3]| gradient.map(|row| (0..3).map(|a| row[a] * p[a]).sum::<f64>());
+    subdomain.points.iter().flat_map(at).collect()
+}
+
+fn size(v: &[f64]) -> f64 {
+    v.iter().fold(0.0, |size, x| size.max(x.abs()))
+}
+
+#[test]
+fn a_linear_displacement_leaves_no_force_inside_whether_elastic_or_plastic() {
+    for strain in [1e-4, 1e-1] {
+        for scene in shapes() {
+            on_ranks(&scene, 1, |setup| {
+                for subdomain in setup.subdomains() {
+                    let u = linear_field(subdomain, strain);
+                    let mut forces = vec![0.0; u.len()];
+                    let found = internal::add_forces(subdomain, &STEEL, &u, &mut forces);
+                    assert_eq!(found.plastic, if strain > 1e-2 { subdomain.elements.len() } else { 0 });
+                    let tolerance = 1e-12 * size(&forces);
+                    for (node, force) in forces.chunks_exact(3).enumerate() {
+                        let inside = subdomain.boundary.binary_search(&(node as u32)).is_err();
+                        assert!(!inside || size(force) < tolerance);
+                    }
+                    for axis in 0..3 {
+                        let resultant: f64 = forces.iter().skip(axis).step_by(3).sum();
+                        assert!(resultant.abs() < tolerance);
+                    }
+                }
+            });
+        }
+    }
+}
+
+#[test]
+fn elastic_forces_energy_and_norm_are_those_of_the_stiffness() {
+    for scene in shapes() {
+        on_ranks(&scene, 1, |setup| {
+            let material = Material::elastic(210.0, 0.29);
+            for (subdomain, u) in setup.subdomains().iter().zip(setup.displacements(4)) {
+                let pattern = pattern_of(subdomain);
+                let k = dense(&pattern, &elastic(subdomain, &material, &pattern));
+                let mut forces = vec![0.0; u.len()];
+                let found = internal::add_forces(subdomain, &material, &u, &mut forces);
+                let ku = &k * column(&u);
+                assert_close(&column(&forces), &ku, 1e-13);
+                let square = (column(&u).transpose() * ku)[(0, 0)];
+                assert!((found.energy - 0.5 * square).abs() < 1e-13 * square);
+                let [norm] = internal::elastic_squares(subdomain, &material, [&u]);
+                assert!((norm - square).abs() < 1e-13 * square);
+            }
+        });
+    }
+}
+
+#[test]
+fn rigid_motions_meet_no_stiffness_in_any_shape_elastic_or_plastic() {
+    for scene in shapes() {
+        on_ranks(&scene, 1, |setup| {
+            let mut blocks = Vec::new();
+            for (own, subdomain) in setup.subdomains().iter().enumerate() {
+                let pattern = pattern_of(subdomain);
+                let mut values = vec![0.0; pattern.rows.len()];
+                let u = linear_field(subdomain, if own % 2 == 0 { 0.0 } else { 0.1 });
+                stiffness::assemble(subdomain, &STEEL, &u, &pattern, &mut values);
+                blocks.push(dense(&pattern, &values));
+            }
+            let k = block_diagonal(&blocks);
+            let residual = (&k * setup.dense_modes()).norm_max() / k.norm_max();
+            assert!(residual < 1e-14, "{residual:e}");
+        });
+    }
+}
+
+#[test]
+fn forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces() {
+    for scene in shapes() {
+        on_ranks(&scene, 1, |setup| {
+            let fields = setup.displacements(9).into_iter().zip(setup.displacements(10));
+            for (subdomain, (u, direction)) in setup.subdomains().iter().zip(fields) {
+                let material = half_yielding(subdomain, &u);
+                let at = |by: f64| {
+                    let moved: Vec<f64> = u.iter().zip(&direction).map(|(u, d)| u + by * d).collect();
+                    let mut forces = vec![0.0; u.len()];
+                    let found = internal::add_forces(subdomain, &material, &moved, &mut forces);
+                    (found, forces)
+                };
+                let h = 1e-6;
+                let (back, here, ahead) = (at(-h), at(0.0), at(h));
+
+                let slope: f64 = here.1.iter().zip(&direction).map(|(f, d)| f * d).sum();
+                let sum: f64 = here.1.iter().map(|f| f.abs()).sum();
+                assert!(((ahead.0.energy - back.0.energy) / (2.0 * h) - slope).abs() < 1e-6 * sum);
+
+                let pattern = pattern_of(subdomain);
+                let mut values = vec![0.0; pattern.rows.len()];
+                let plastic = stiffness::assemble(subdomain, &material, &u, &pattern, &mut values);
+                assert_eq!(plastic, here.0.plastic);
+                let change: Vec<f64> = ahead.1.iter().zip(&back.1).map(|(a, b)| (a - b) / (2.0 * h)).collect();
+                assert_close(&column(&change), &(dense(&pattern, &values) * column(&direction)), 1e-6);
+            }
+        });
+    }
+}
+
+/// A material of which at least half of the elements, but not all, yield at `u`.
+fn half_yielding(subdomain: &Subdomain, u: &[f64]) -> Material {
+    let material = |k: i32| Material { yield_stress: Some(STEEL.young * 0.9_f64.powi(k)), ..STEEL };
+    let plastic = |m: &Material| internal::add_forces(subdomain, m, u, &mut vec![0.0; u.len()]).plastic;
+    let elements = subdomain.elements.len();
+    let found = (-20..100).map(material).find(|m| 2 * plastic(m) >= elements).expect("everything yields at last");
+    assert!(plastic(&found) < elements);
+    found
+}
+
+#[test]
+fn tractions_add_up_to_traction_times_area_on_any_cut_and_any_ranks() {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(24)] {
+        let nodal = same_on_any_ranks(&scene, |setup| {
+            let forces = |subdomain: &Subdomain| {
+                let mut forces = vec![0.0; subdomain.dofs()];
+                add_tractions(subdomain, &setup.discrete.tractions, &mut forces);
+                forces
+            };
+            setup.subdomains().iter().flat_map(forces).collect()
+        });
+        for (axis, traction) in [0.1, 0.2, -0.3].into_iter().enumerate() {
+            let total: f64 = nodal.iter().skip(axis).step_by(3).sum();
+            assert!((total - traction * 4.0 * 2.2).abs() < 1e-13);
+        }
+    }
+}
+
+#[test]
+fn each_triangle_gives_a_third_of_its_force_to_each_corner_and_tractions_on_one_surface_add_up() {
+    let cube = built_in("bar", &["body.bar.brick.cells=[1, 1, 1]", "decomposition.cells=[1, 1, 1]"]);
+    on_ranks(&cube, 1, |setup| {
+        let subdomain = &setup.subdomains()[0];
+        let Traction { surface, value } = setup.discrete.tractions[0];
+        let pull = Traction { surface, value: value.map(|t| 0.5 * t) };
+        let mut forces = vec![0.0; subdomain.dofs()];
+        add_tractions(subdomain, &[pull, pull], &mut forces);
+        let total = 500.0 * 500.0 * 500.0;
+        // The diagonal of xmax runs through corners 3 and 5: both triangles meet there.
+        for (node, sixths) in [0.0, 1.0, 0.0, 2.0, 0.0, 2.0, 0.0, 1.0].into_iter().enumerate() {
+            assert!((forces[3 * node] - sixths / 6.0 * total).abs() < 1e-15 * total, "{node}");
+            assert_eq!(forces[3 * node + 1..][..2], [0.0, 0.0]);
+        }
+    });
+}

@@ -1,0 +1,146 @@
+use faer::Mat;
+
+use super::contact;
+use super::{ConstraintError, Constraints, Kind, Row, Support};
+use crate::contact::ContactPair;
+use crate::decomposition::{InterfaceNode, Subdomain};
+use crate::fixture::{RANKS, Setup, assert_close, built_in, column, on_ranks, two_bricks, two_bricks_by_metis};
+use crate::scene::Scene;
+
+/// Contact of subdomains that do not match, nodes with eight copies, METIS parts.
+fn scenes() -> [Scene; 4] {
+    [
+        two_bricks(&[]),
+        two_bricks_by_metis(9),
+        built_in("patch", &[]),
+        built_in("patch", &["decomposition.subdomains=12"]),
+    ]
+}
+
+#[test]
+fn rows_are_orthonormal() {
+    for scene in scenes() {
+        on_ranks(&scene, 1, |setup| {
+            let b = setup.dense_rows();
+            assert_close(&(&b * b.transpose()), &Mat::identity(b.nrows(), b.nrows()), 1e-14);
+        });
+    }
+    let most = on_ranks(&built_in("patch", &[]), 1, |setup| {
+        setup.discrete.decomposition.interface.iter().map(|n| n.copies.len()).max()
+    });
+    assert_eq!(most, [Some(8)]);
+}
+
+/// A rigid motion of space: displacement of a point.
+fn motion(point: [f64; 3]) -> [f64; 3] {
+    let (shift, turn) = ([0.3, -0.7, 0.2], [0.4, 0.5, -0.6]);
+    std::array::from_fn(|a| {
+        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+        shift[a] + turn[b] * point[c] - turn[c] * point[b]
+    })
+}
+
+#[test]
+fn a_common_motion_leaves_gluing_at_rest_and_is_seen_by_supports_and_contact() {
+    for scene in scenes() {
+        on_ranks(&scene, 1, |setup| {
+            let motions = |s: &Subdomain| s.points.iter().flat_map(|&p| motion(p)).collect::<Vec<_>>();
+            let u: Vec<f64> = setup.subdomains().iter().flat_map(motions).collect();
+            let bu = setup.dense_rows() * column(&u);
+            let size = u.iter().fold(0.0_f64, |size, u| size.max(u.abs()));
+            for (found, row) in bu.col(0).iter().zip(setup.rows()) {
+                let expected = match row.kind {
+                    Kind::Gluing => 0.0,
+                    Kind::Support { axis, .. } => {
+                        (row.terms.len() as f64).sqrt() * motion(point(setup, row.terms[0].node))[axis]
+                    }
+                    Kind::Contact { pair } => {
+                        let ContactPair { slave, master, normal, .. } = setup.discrete.pairs[pair];
+                        let part = |node: u64, axis: usize| {
+                            let free = row.terms.iter().any(|t| (t.node, t.axis) == (node, axis));
+                            if free { normal[axis] * motion(point(setup, node))[axis] } else { 0.0 }
+                        };
+                        row.scale * (0..3).map(|a| part(slave, a) - part(master, a)).sum::<f64>()
+                    }
+                };
+                assert!((found - expected).abs() < 1e-14 * size, "{row:?}");
+            }
+        });
+    }
+}
+
+fn point(setup: &Setup, node: u64) -> [f64; 3] {
+    let mut holders = setup.subdomains().iter().filter_map(|s| s.local_node(node).map(|local| s.points[local]));
+    holders.next().expect("every node is somewhere")
+}
+
+#[test]
+fn every_rank_holds_the_blocks_of_its_subdomains_and_all_ranks_the_same_rows() {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(9)] {
+        let blocks = |constraints: &Constraints| -> Vec<(Vec<u32>, Vec<Row>)> {
+            let rows = constraints.blocks.iter().map(|rows| constraints.rows[rows.clone()].to_vec());
+            constraints.block_subdomains.iter().cloned().zip(rows).collect()
+        };
+        let alone = on_ranks(&scene, 1, |setup| blocks(&setup.discrete.constraints)).remove(0);
+        for ranks in RANKS {
+            on_ranks(&scene, ranks, |setup| {
+                let own = |subdomain: &u32| setup.discrete.decomposition.own_index(*subdomain).is_some();
+                let expected = alone.iter().filter(|(subdomains, _)| subdomains.iter().any(own));
+                assert!(blocks(&setup.discrete.constraints).iter().eq(expected), "{ranks} ranks");
+            });
+        }
+    }
+}
+
+#[test]
+fn supports_in_conflict_are_refused_on_every_rank_with_one_message() {
+    for ranks in RANKS {
+        let errors = on_ranks(&two_bricks(&[]), ranks, |setup| {
+            let mut supports = setup.discrete.supports.clone();
+            let [name, value] = ["other", "right"].map(String::from);
+            let twin = supports.iter().find(|s| s.name == value).expect("the scene has it");
+            supports.push(Support { name, displacement: [0.0, 0.1, 0.5], ..twin.clone() });
+            Constraints::new(setup.comm, &setup.discrete.decomposition, &supports, &[]).err()
+        });
+        let expected = ConstraintError::Conflict {
+            first: "right".into(),
+            second: "other".into(),
+            axis: 'z',
+            first_value: 0.0,
+            second_value: 0.5,
+        };
+        assert!(errors.iter().all(|error| error.as_ref() == Some(&expected)), "{ranks} ranks: {errors:?}");
+    }
+}
+
+#[test]
+fn a_pair_fixed_on_both_sides_along_the_normal_has_no_row() {
+    let flush = two_bricks(&["body.upper.brick.origin.0=0.0", "support.right.surface=upper.xmin"]);
+    for ranks in RANKS {
+        on_ranks(&flush, ranks, |setup| {
+            let [_, _, contact] = crate::study::count_rows(&setup.discrete, setup.comm);
+            assert_eq!((setup.discrete.pairs.len(), contact), (15, 12));
+        });
+    }
+    on_ranks(&flush, 1, |setup| assert_eq!(setup.discrete.constraints.idle_pairs, 3));
+}
+
+#[test]
+fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_hand_side() {
+    let node = |node, copies: &[u32]| InterfaceNode { node, copies: copies.to_vec(), surfaces: vec![] };
+    let pair = ContactPair { contact: 0, slave: 7, master: 8, normal: [0.6, 0.0, 0.8], gap: 0.5, area: 1.0 };
+    let (slave, master) = (node(7, &[0, 3]), node(8, &[1, 2, 4]));
+    let held = [Some((0, 0.25)), None, None];
+    let row = contact::row(3, &pair, (&slave, held), (&master, [None; 3])).expect("much is free");
+    let square: f64 = row.terms.iter().map(|t| t.value * t.value).sum();
+    assert!((square - 1.0).abs() < 1e-15);
+    assert!((row.rhs - row.scale * (0.5 - 0.6 * 0.25)).abs() < 1e-15);
+    let coefficient = |node: u64, axis: usize| -> f64 {
+        row.terms.iter().filter(|t| (t.node, t.axis) == (node, axis)).map(|t| t.value / row.scale).sum()
+    };
+    for (node, axis, expected) in [(7, 0, 0.0), (7, 1, 0.0), (7, 2, 0.8), (8, 0, -0.6), (8, 1, 0.0), (8, 2, -0.8)] {
+        assert!((coefficient(node, axis) - expected).abs() < 1e-15, "{node} {axis}");
+    }
+    let all = [Some((0, 0.0)); 3];
+    assert_eq!(contact::row(3, &pair, (&slave, all), (&master, all)), None);
+}

@@ -1,0 +1,242 @@
+//! Small torn problems for the tests of all rooms, on any number of ranks.
+
+use faer::Mat;
+
+use crate::assembly::pattern::Pattern;
+use crate::assembly::stiffness;
+use crate::comm::{Comm, threads};
+use crate::constraint::Row;
+use crate::decomposition::Subdomain;
+use crate::feti::Torn;
+use crate::feti::coarse::{Coarse, Floating};
+use crate::feti::factor::{Factors, analyse};
+use crate::feti::gather::Gather;
+use crate::feti::kernel::RigidModes;
+use crate::feti::space::RowSpace;
+use crate::material::Material;
+use crate::random::Random;
+use crate::scene::Scene;
+use crate::study::{self, Discrete};
+
+/// Numbers of ranks to test on: one, even, odd, and more than [`two_bricks`] has subdomains.
+pub const RANKS: [usize; 4] = [1, 2, 3, 5];
+
+/// Two bricks of unequal stiffness, each held at its far end; the upper one is shifted by half a subdomain. Four
+/// subdomains unless `sets` say otherwise.
+pub fn two_bricks(sets: &[&str]) -> Scene {
+    const TEXT: &str = r#"
+        [material.hard]
+        young = 210.0
+        poisson = 0.29
+        yield_stress = 0.45
+        hardening = 10.0
+        [material.soft]
+        young = 30.0
+        poisson = 0.4
+        [body.lower]
+        material = "hard"
+        element = "tet4"
+        brick = { origin = [0.0, 0.0, 0.0], size = [4.0, 2.2, 2.0], cells = [4, 2, 2] }
+        [body.upper]
+        material = "soft"
+        element = "tet4"
+        brick = { origin = [1.0, 0.0, 2.1], size = [4.0, 2.2, 1.8], cells = [4, 2, 2] }
+        [support.left]
+        surface = "lower.xmin"
+        fix = ["x", "y", "z"]
+        [support.right]
+        surface = "upper.xmax"
+        fix = ["x", "y", "z"]
+        displacement = [0.0, 0.1, 0.0]
+        [load.top]
+        surface = "upper.zmax"
+        traction = [0.1, 0.2, -0.3]
+        [contact.joint]
+        slave = "upper.zmin"
+        master = "lower.zmax"
+        [decomposition]
+        method = "bricks"
+        cells = [2, 2, 2]
+    "#;
+    Scene::from_text(TEXT, "two bricks", 1, &owned(sets)).expect("the scene is sound")
+}
+
+/// Two bricks cut by METIS into about so many parts.
+pub fn two_bricks_by_metis(parts: usize) -> Scene {
+    two_bricks(&[&format!("decomposition.subdomains={parts}")])
+}
+
+/// A built-in scene; `patch` has nodes with eight copies.
+pub fn built_in(name: &str, sets: &[&str]) -> Scene {
+    Scene::load(name, 1, &owned(sets)).expect("the scene is sound")
+}
+
+fn owned(sets: &[&str]) -> Vec<String> {
+    sets.iter().map(|set| set.to_string()).collect()
+}
+
+/// One rank's part of a torn problem.
+pub struct Setup<'a> {
+    pub comm: &'a dyn Comm,
+    pub discrete: Discrete,
+    pub gather: Gather<'a>,
+    pub space: RowSpace<'a>,
+    pub modes: Vec<RigidModes>,
+}
+
+impl<'a> Setup<'a> {
+    pub fn new(scene: &Scene, comm: &'a dyn Comm) -> Self {
+        let discrete = study::discretise(scene, comm).expect("the scene has a discrete problem");
+        let Discrete { decomposition, constraints, .. } = &discrete;
+        let subdomains = &decomposition.subdomains;
+        let dofs = subdomains.iter().map(Subdomain::dofs).collect();
+        let gather = Gather::new(comm, &decomposition.shares, constraints, dofs);
+        let space = RowSpace::new(comm, &decomposition.shares, constraints);
+        let modes = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
+        Self { comm, discrete, gather, space, modes }
+    }
+
+    pub fn subdomains(&self) -> &[Subdomain] {
+        &self.discrete.decomposition.subdomains
+    }
+
+    pub fn rows(&self) -> &[Row] {
+        &self.discrete.constraints.rows
+    }
+
+    pub fn material(&self, own: usize) -> &Material {
+        &self.discrete.materials[self.subdomains()[own].body]
+    }
+
+    pub fn coarse(&self) -> Result<Coarse<'a>, Floating> {
+        let Discrete { decomposition, constraints, .. } = &self.discrete;
+        Coarse::new(self.comm, &decomposition.shares, self.subdomains(), &self.modes, constraints, &self.gather)
+    }
+
+    /// Factors of the elastic stiffness matrices, and these.
+    pub fn factors(&self) -> (Factors, Vec<Vec<f64>>) {
+        let mut factors = Factors::new(analyse(self.subdomains()));
+        let mut stiffnesses = Vec::new();
+        for (own, subdomain) in self.subdomains().iter().enumerate() {
+            let values = elastic(subdomain, self.material(own), &factors.symbolic(own).pattern);
+            factors.factorise(own, subdomain, &values).expect("elastic bodies are stiff");
+            stiffnesses.push(values);
+        }
+        (factors, stiffnesses)
+    }
+
+    /// Random multipliers that depend on their rows alone: the same on any number of ranks.
+    pub fn multipliers(&self, seed: u64) -> Vec<f64> {
+        let mix = |key: u64, part: u64| (key ^ part).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+        let number = |row: &Row| {
+            let parts = row.terms.iter().flat_map(|t| [t.subdomain.into(), t.node, t.axis as u64, t.value.to_bits()]);
+            Random::new(parts.fold(seed, mix)).number()
+        };
+        self.rows().iter().map(number).collect()
+    }
+
+    /// Random displacements, the same on any number of ranks.
+    pub fn displacements(&self, seed: u64) -> Torn {
+        let random = |s: &Subdomain| {
+            let mut random = Random::new(seed + 1000 * s.id as u64);
+            (0..s.dofs()).map(|_| random.number()).collect()
+        };
+        self.subdomains().iter().map(random).collect()
+    }
+
+    /// The values of the rows that count for own subdomains: in rank order, all rows once and in one order.
+    pub fn owned(&self, rows: &[f64]) -> Vec<f64> {
+        self.space.owned().iter().flatten().map(|&row| rows[row as usize]).collect()
+    }
+
+    /// `B`, on a single rank.
+    pub fn dense_rows(&self) -> Mat<f64> {
+        let mut begins = vec![0];
+        self.subdomains().iter().for_each(|s| begins.push(begins[s.id] + s.dofs()));
+        let mut b = Mat::zeros(self.rows().len(), begins[self.subdomains().len()]);
+        for (at, row) in self.rows().iter().enumerate() {
+            for term in &row.terms {
+                let subdomain = term.subdomain as usize;
+                let node = self.subdomains()[subdomain].local_node(term.node).expect("a copy is in its subdomain");
+                b[(at, begins[subdomain] + 3 * node + term.axis)] += term.value;
+            }
+        }
+        b
+    }
+
+    /// `R`, on a single rank.
+    pub fn dense_modes(&self) -> Mat<f64> {
+        let total: usize = self.subdomains().iter().map(Subdomain::dofs).sum();
+        let mut r = Mat::zeros(total, 6 * self.modes.len());
+        let mut row = 0;
+        for (subdomain, modes) in self.subdomains().iter().zip(&self.modes) {
+            for components in subdomain.points.iter().flat_map(|&point| modes.at(point)) {
+                (0..6).for_each(|k| r[(row, 6 * subdomain.id + k)] = components[k]);
+                row += 1;
+            }
+        }
+        r
+    }
+}
+
+/// The lower values of a subdomain's elastic stiffness.
+pub fn elastic(subdomain: &Subdomain, material: &Material, pattern: &Pattern) -> Vec<f64> {
+    let mut values = vec![0.0; pattern.rows.len()];
+    stiffness::assemble(subdomain, material, &vec![0.0; subdomain.dofs()], pattern, &mut values);
+    values
+}
+
+/// What `body` returns on each rank.
+pub fn on_ranks<T: Send>(scene: &Scene, ranks: usize, body: impl Fn(&Setup) -> T + Sync) -> Vec<T> {
+    threads::run(ranks, |comm| body(&Setup::new(scene, comm)))
+}
+
+/// The numbers that `body` returns on all ranks, one rank behind the other. Asserts that they are the same bits for
+/// every number of ranks.
+pub fn same_on_any_ranks(scene: &Scene, body: impl Fn(&Setup) -> Vec<f64> + Sync) -> Vec<f64> {
+    let [alone, others @ ..] = RANKS.map(|ranks| on_ranks(scene, ranks, &body).concat());
+    for (numbers, ranks) in others.iter().zip(&RANKS[1..]) {
+        assert!(numbers.iter().map(|x| x.to_bits()).eq(alone.iter().map(|x| x.to_bits())), "{ranks} ranks differ");
+    }
+    alone
+}
+
+/// The symmetric matrix with these lower values.
+pub fn dense(pattern: &Pattern, values: &[f64]) -> Mat<f64> {
+    let n = pattern.dofs();
+    let mut matrix = Mat::zeros(n, n);
+    for column in 0..n {
+        for at in pattern.column_begin[column] as usize..pattern.column_begin[column + 1] as usize {
+            let row = pattern.rows[at] as usize;
+            matrix[(row, column)] = values[at];
+            matrix[(column, row)] = values[at];
+        }
+    }
+    matrix
+}
+
+/// The block diagonal matrix of these blocks.
+pub fn block_diagonal(blocks: &[Mat<f64>]) -> Mat<f64> {
+    let total = blocks.iter().map(Mat::nrows).sum();
+    let mut matrix = Mat::zeros(total, total);
+    let mut begin = 0;
+    for block in blocks {
+        let n = block.nrows();
+        matrix.submatrix_mut(begin, begin, n, n).copy_from(block);
+        begin += n;
+    }
+    matrix
+}
+
+/// A matrix of one column.
+pub fn column(values: &[f64]) -> Mat<f64> {
+    Mat::from_fn(values.len(), 1, |i, _| values[i])
+}
+
+/// Asserts that two matrices agree to `tolerance`, relative to the largest entry of the second.
+#[track_caller]
+pub fn assert_close(found: &Mat<f64>, expected: &Mat<f64>, tolerance: f64) {
+    assert_eq!((found.nrows(), found.ncols()), (expected.nrows(), expected.ncols()));
+    let error = (found - expected).norm_max() / expected.norm_max();
+    assert!(error <= tolerance, "relative error {error:e}");
+}
