@@ -253,7 +253,7 @@ impl CoarseFactor {
         self.solve(&mut x);
         let worst = x.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         match worst {
-            Some((at, response)) if !(response.abs() * largest < (n as f64).sqrt() / SINGULAR) => {
+            Some((at, response)) if response.is_nan() || response.abs() * largest > (n as f64).sqrt() / SINGULAR => {
                 Err(Floating { subdomain: at / MODES })
             }
             _ => Ok(()),

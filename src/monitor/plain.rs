@@ -121,6 +121,8 @@ mod tests {
             damping: 1.0,
             plastic_elements: 6813,
             active_contacts: 70,
+            energy: -1.0,
+            factorisations: 4,
             qp_iterations: 25,
             hessian_multiplications: 325,
             seconds: 1.234,
