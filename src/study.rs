@@ -53,6 +53,8 @@ pub struct Discrete {
     pub bodies: Vec<BodyMesh>,
     /// Their materials.
     pub materials: Vec<Material>,
+    /// Surfaces that the scene names.
+    pub surfaces: Vec<Surface>,
     /// Own subdomains and interface.
     pub decomposition: Decomposition,
     /// All contact pairs of the scene.
@@ -114,7 +116,7 @@ pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError
     let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
     let constraints: Result<_, ConstraintError> = Constraints::new(comm, &decomposition, &supports, &pairs);
     let constraints = agree(comm, "supports", constraints).map_err(StudyError::Supports)?;
-    Ok(Discrete { bodies, materials, decomposition, pairs, supports, tractions, constraints })
+    Ok(Discrete { bodies, materials, surfaces, decomposition, pairs, supports, tractions, constraints })
 }
 
 fn material(m: &scene::Material) -> Material {

@@ -199,6 +199,9 @@ mod tests {
 
         fn from(&mut self, start: Start, preconditioner: Option<&mut Matrix>) -> Solution {
             let before = self.a.products;
+            let mut size = self.b.clone();
+            self.null.project(&mut size);
+            self.settings.limits.reference = Some(dot(&size, &size).sqrt());
             let problem = Problem {
                 space: &Plain,
                 function: &mut Joined {
