@@ -79,3 +79,53 @@ pub fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{RANKS, on_ranks, two_bricks, two_bricks_by_metis};
+
+    #[test]
+    fn a_face_is_gathered_whole_on_every_rank_with_its_normal_and_area() {
+        for scene in [two_bricks(&[]), two_bricks_by_metis(24)] {
+            for ranks in RANKS {
+                on_ranks(&scene, ranks, |setup| {
+                    let (bodies, surfaces) = (&setup.discrete.bodies, &setup.discrete.surfaces);
+                    for (index, surface) in surfaces.iter().enumerate() {
+                        let body = &bodies[surface.body];
+                        let found = GatheredSurface::gather(setup.comm, setup.subdomains(), index);
+                        let on = |node: &u64| body.brick.is_on(surface.face, body.brick.node_position(*node));
+                        let nodes: Vec<u64> = (0..body.brick.node_count()).filter(on).collect();
+                        let points: Vec<_> =
+                            nodes.iter().map(|&n| body.brick.coordinates(body.brick.node_position(n))).collect();
+                        assert_eq!(found.nodes, nodes.iter().map(|n| body.first_node + n).collect::<Vec<_>>());
+                        assert_eq!(found.points, points);
+                        assert_eq!(found.triangles.len() as u64, body.brick.triangle_count(surface.face));
+
+                        let of_nodes = found.normals_and_areas();
+                        assert!(of_nodes.iter().all(|(normal, _)| *normal == surface.face.normal()));
+                        let axis = surface.face.axis();
+                        let area: f64 = (0..3).filter(|&a| a != axis).map(|a| body.brick.size[a]).product();
+                        let sum: f64 = of_nodes.iter().map(|(_, area)| area).sum();
+                        assert!((sum - area).abs() < 1e-14 * area);
+                    }
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn at_an_edge_the_normal_is_the_mean_weighted_by_area() {
+        let roof = GatheredSurface {
+            nodes: vec![0, 1, 2, 3],
+            points: vec![[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
+            triangles: vec![[0, 2, 1], [0, 1, 3]],
+        };
+        let [(ridge, area), _, (slope, third), _] = roof.normals_and_areas()[..] else { panic!("four nodes") };
+        let length = 5.0_f64.sqrt();
+        let expected = [-1.0 / length, 0.0, 2.0 / length];
+        assert!((0..3).all(|a| (ridge[a].abs() - expected[a].abs()).abs() < 1e-15));
+        assert!((area - 0.5).abs() < 1e-15 && (third - 1.0 / 3.0).abs() < 1e-15);
+        assert_eq!(slope, [0.0, 0.0, 1.0]);
+    }
+}

@@ -274,3 +274,6 @@ impl CoarseFactor {
 
 /// A coarse problem conditioned worse than the inverse of this leaves a motion free.
 const SINGULAR: f64 = 1e-12;
+
+#[cfg(test)]
+mod tests;

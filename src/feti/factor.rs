@@ -217,3 +217,6 @@ fn fixing_nodes(points: &[[f64; 3]]) -> Vec<u32> {
     chosen.sort_unstable();
     chosen
 }
+
+#[cfg(test)]
+mod tests;

@@ -157,3 +157,72 @@ impl<'a> Gather<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::fixture::{
+        RANKS, assert_close, built_in, column, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis,
+    };
+    use crate::scene::Scene;
+
+    fn scenes() -> [Scene; 3] {
+        [two_bricks(&[]), two_bricks_by_metis(9), built_in("patch", &[])]
+    }
+
+    #[test]
+    fn b_and_its_transpose_are_those_of_the_rows() {
+        for scene in scenes() {
+            on_ranks(&scene, 1, |setup| {
+                let (b, u, x) = (setup.dense_rows(), setup.displacements(1), setup.multipliers(2));
+                let mut bu = vec![f64::NAN; x.len()];
+                setup.gather.apply(&u, &mut bu);
+                assert_close(&column(&bu), &(&b * column(&u.concat())), 1e-14);
+                let mut torn = u.clone();
+                setup.gather.add_transpose(-2.0, &x, &mut torn);
+                assert_close(&column(&torn.concat()), &(column(&u.concat()) - 2.0 * (b.transpose() * column(&x))), 1e-14);
+            });
+        }
+    }
+
+    #[test]
+    fn b_and_its_transpose_are_adjoint_over_any_ranks() {
+        for scene in scenes() {
+            for ranks in RANKS {
+                on_ranks(&scene, ranks, |setup| {
+                    let (u, x) = (setup.displacements(1), setup.multipliers(2));
+                    let mut bu = vec![0.0; x.len()];
+                    setup.gather.apply(&u, &mut bu);
+                    let mut torn = setup.gather.zeros();
+                    setup.gather.add_transpose(1.0, &x, &mut torn);
+                    let local = |(u, f): (&Vec<f64>, &Vec<f64>)| u.iter().zip(f).map(|(u, f)| u * f).sum();
+                    let partial: Vec<f64> = u.iter().zip(&torn).map(local).collect();
+                    let [over_rows, size] = setup.space.dots(&[(&bu, &x), (&x, &x)])[..] else { panic!() };
+                    assert!((over_rows - setup.space.sum(&partial, 1)[0]).abs() < 1e-14 * size);
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn images_are_the_same_bits_on_any_ranks_and_on_all_that_hold_a_row() {
+        for scene in scenes() {
+            same_on_any_ranks(&scene, |setup| {
+                let mut torn = setup.gather.zeros();
+                setup.gather.add_transpose(1.0, &setup.multipliers(3), &mut torn);
+                torn.concat()
+            });
+            let image = |setup: &crate::fixture::Setup| {
+                let mut bu = vec![0.0; setup.rows().len()];
+                setup.gather.apply(&setup.displacements(4), &mut bu);
+                bu
+            };
+            same_on_any_ranks(&scene, |setup| setup.owned(&image(setup)));
+            // Back through B', every holder's copy counts.
+            same_on_any_ranks(&scene, |setup| {
+                let mut torn = setup.gather.zeros();
+                setup.gather.add_transpose(1.0, &image(setup), &mut torn);
+                torn.concat()
+            });
+        }
+    }
+}

@@ -95,3 +95,6 @@ impl<'a> Preconditioner<'a> {
         self.applications
     }
 }
+
+#[cfg(test)]
+mod tests;

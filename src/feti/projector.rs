@@ -25,3 +25,69 @@ impl Projector<'_> {
         self.coarse.add_transpose(1.0, &a, rows);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Setup, on_ranks, two_bricks, two_bricks_by_metis};
+    use crate::scene::Scene;
+
+    fn scenes() -> [Scene; 2] {
+        [two_bricks(&[]), two_bricks_by_metis(7)]
+    }
+
+    fn projector<'a>(setup: &Setup<'a>) -> Projector<'a> {
+        Projector { coarse: setup.coarse().expect("the bodies are held") }
+    }
+
+    fn norm(v: &[f64]) -> f64 {
+        v.iter().map(|v| v * v).sum::<f64>().sqrt()
+    }
+
+    #[test]
+    fn projects_orthogonally_onto_the_kernel_of_g() {
+        for scene in scenes() {
+            for ranks in [1, 3] {
+                on_ranks(&scene, ranks, |setup| {
+                    let projector = projector(setup);
+                    let (x, y) = (setup.multipliers(1), setup.multipliers(2));
+                    let [mut px, mut py] = [x.clone(), y.clone()];
+                    let a = projector.project(&mut px);
+                    projector.project(&mut py);
+                    assert!(norm(&projector.coarse.apply(&px)) < 1e-12 * norm(&projector.coarse.apply(&x)));
+
+                    let mut twice = px.clone();
+                    projector.project(&mut twice);
+                    let error: Vec<f64> = twice.iter().zip(&px).map(|(a, b)| a - b).collect();
+                    assert!(norm(&error) < 1e-12 * norm(&px));
+
+                    let products = setup.space.dots(&[(&px, &y), (&x, &py), (&px, &py)]);
+                    let size = setup.space.dots(&[(&x, &x)])[0];
+                    assert!(products.iter().all(|p| (p - products[0]).abs() < 1e-12 * size));
+
+                    // What is taken away is G' of the returned amplitudes.
+                    projector.coarse.add_transpose(1.0, &a, &mut px);
+                    let error: Vec<f64> = px.iter().zip(&x).map(|(a, b)| a - b).collect();
+                    assert!(norm(&error) < 1e-12 * norm(&x));
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn the_particular_multiplier_balances_and_is_the_smallest() {
+        for scene in scenes() {
+            on_ranks(&scene, 2, |setup| {
+                let projector = projector(setup);
+                let e: Vec<f64> = projector.coarse.apply(&setup.multipliers(3));
+                let mut rows = setup.multipliers(4);
+                projector.particular(&e, &mut rows);
+                let error: Vec<f64> = projector.coarse.apply(&rows).iter().zip(&e).map(|(a, b)| a - b).collect();
+                assert!(norm(&error) < 1e-12 * norm(&e));
+                let size = norm(&rows);
+                projector.project(&mut rows);
+                assert!(norm(&rows) < 1e-12 * size);
+            });
+        }
+    }
+}

@@ -54,3 +54,38 @@ impl<'a> RowSpace<'a> {
         maximum(self.comm, &[mine])[0]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::fixture::{RANKS, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis};
+
+    #[test]
+    fn products_count_every_row_once_and_are_the_same_bits_on_every_rank() {
+        for scene in [two_bricks(&[]), two_bricks_by_metis(9)] {
+            let [x, y] = [1, 2].map(|seed| same_on_any_ranks(&scene, |setup| setup.owned(&setup.multipliers(seed))));
+            let plain: f64 = x.iter().zip(&y).map(|(x, y)| x * y).sum();
+            let square: f64 = x.iter().map(|x| x * x).sum();
+            let mut bits = Vec::new();
+            for ranks in RANKS {
+                bits.extend(on_ranks(&scene, ranks, |setup| {
+                    let (x, y) = (setup.multipliers(1), setup.multipliers(2));
+                    let products = setup.space.dots(&[(&x, &y), (&x, &x)]);
+                    assert!((products[0] - plain).abs() < 1e-14 * square && (products[1] - square).abs() < 1e-14 * square);
+                    products.iter().map(|p| p.to_bits()).collect::<Vec<_>>()
+                }));
+            }
+            assert!(bits.iter().all(|b| *b == bits[0]));
+        }
+    }
+
+    #[test]
+    fn the_largest_value_over_the_ranks_is_known_to_all_and_nan_wins() {
+        for ranks in RANKS {
+            on_ranks(&two_bricks(&[]), ranks, |setup| {
+                assert_eq!(setup.space.maximum(-1.0 - setup.comm.rank() as f64), -1.0);
+                let fault = if setup.comm.rank() + 1 == ranks { f64::NAN } else { 1.0 };
+                assert!(setup.space.maximum(fault).is_nan());
+            });
+        }
+    }
+}

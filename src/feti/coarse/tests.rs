@@ -1,0 +1,115 @@
+use faer::Mat;
+use faer::prelude::Solve;
+
+use super::MODES;
+use crate::constraint::Kind;
+use crate::feti::projector::Projector;
+use crate::fixture::{
+    RANKS, Setup, assert_close, built_in, column, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis,
+};
+use crate::random::Random;
+use crate::scene::Scene;
+
+fn scenes() -> [Scene; 3] {
+    [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[])]
+}
+
+/// `G = R'B'`.
+fn dense_coarse(setup: &Setup) -> Mat<f64> {
+    setup.dense_modes().transpose() * setup.dense_rows().transpose()
+}
+
+fn amplitudes(count: usize) -> Vec<f64> {
+    let mut random = Random::new(77);
+    (0..count).map(|_| random.number()).collect()
+}
+
+#[test]
+fn products_and_solutions_are_those_of_the_dense_matrices() {
+    for scene in scenes() {
+        on_ranks(&scene, 1, |setup| {
+            let (g, coarse) = (dense_coarse(setup), setup.coarse().expect("the bodies are held"));
+            let x = setup.multipliers(1);
+            assert_close(&column(&coarse.apply(&x)), &(&g * column(&x)), 1e-13);
+
+            let mut a = amplitudes(g.nrows());
+            let mut rows = x.clone();
+            coarse.add_transpose(-0.5, &a, &mut rows);
+            assert_close(&column(&rows), &(column(&x) - 0.5 * (g.transpose() * column(&a))), 1e-13);
+
+            let expected = (&g * g.transpose()).partial_piv_lu().solve(column(&a));
+            coarse.solve(&mut a);
+            assert_close(&column(&a), &expected, 1e-9);
+        });
+    }
+}
+
+#[test]
+fn a_restricted_coarse_problem_knows_the_kept_rows_only() {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+        on_ranks(&scene, 1, |setup| {
+            let (mut g, coarse) = (dense_coarse(setup), setup.coarse().expect("the bodies are held"));
+            let kept: Vec<bool> = setup.rows().iter().map(|row| !row.is_inequality()).collect();
+            for row in (0..kept.len()).filter(|&row| !kept[row]) {
+                g.col_mut(row).fill(0.0);
+            }
+            let mut a = amplitudes(g.nrows());
+            let expected = (&g * g.transpose()).partial_piv_lu().solve(column(&a));
+            coarse.restricted(|row| kept[row]).expect("supports hold both bodies").solve(&mut a);
+            assert_close(&column(&a), &expected, 1e-9);
+        });
+    }
+}
+
+#[test]
+fn coarse_products_and_solutions_are_the_same_bits_on_any_ranks() {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+        for solved in [false, true] {
+            same_on_any_ranks(&scene, |setup| {
+                let coarse = setup.coarse().expect("the bodies are held");
+                let mut a = coarse.apply(&setup.multipliers(2));
+                if solved {
+                    coarse.solve(&mut a);
+                }
+                let first = MODES * setup.discrete.decomposition.shares.begin(setup.comm.rank());
+                a[first..][..MODES * setup.subdomains().len()].to_vec()
+            });
+        }
+        same_on_any_ranks(&scene, |setup| {
+            let projector = Projector { coarse: setup.coarse().expect("the bodies are held") };
+            let mut rows = setup.multipliers(2);
+            projector.project(&mut rows);
+            setup.owned(&rows)
+        });
+    }
+}
+
+#[test]
+fn what_nothing_holds_floats_on_every_rank() {
+    // Contact alone, a guide, a hinge: each leaves the upper brick a motion.
+    let upper_free = ["contact", "guide", "hinge"].map(|case| match case {
+        "contact" => two_bricks(&["support.right.surface=lower.xmax", "support.right.displacement=[0.0, 0.0, 0.0]"]),
+        "guide" => two_bricks(&["support.right.fix=[\"x\"]", "support.right.displacement=[0.0, 0.0, 0.0]"]),
+        _ => two_bricks(&["support.right.fix=[\"y\", \"z\"]", "support.right.surface=upper.zmax"]),
+    });
+    for scene in upper_free {
+        for ranks in RANKS {
+            let found = on_ranks(&scene, ranks, |setup| setup.coarse().err());
+            let floating = found[0].as_ref().expect("the upper brick is free");
+            assert!(floating.subdomain >= 2, "the lower brick is held");
+            assert!(found.iter().all(|f| f.as_ref() == Some(floating)), "{ranks} ranks: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_body_that_only_contact_holds_floats_without_it() {
+    // Pushed along x by nothing, the upper brick of the patch test rests on the contact along z.
+    let resting = built_in("patch", &["support.top.surface=lower.zmin", "support.top.displacement=[0.0, 0.0, 0.0]"]);
+    on_ranks(&resting, 2, |setup| {
+        let coarse = setup.coarse().expect("contact holds the upper brick");
+        let gluing_and_supports = |row: usize| !matches!(setup.rows()[row].kind, Kind::Contact { .. });
+        let floating = coarse.restricted(gluing_and_supports).err().expect("nothing holds it along z");
+        assert!(floating.subdomain >= 8);
+    });
+}

@@ -1,0 +1,234 @@
+use faer::prelude::Solve;
+use faer::{Mat, Side};
+
+use super::{Preconditioner, boundaries};
+use crate::constraint::Kind;
+use crate::feti::factor::{Factors, analyse};
+use crate::feti::interior::{self, InteriorFactors};
+use crate::feti::operator::DualOperator;
+use crate::feti::scaling::Scaling;
+use crate::fixture::{
+    Setup, assert_close, block_diagonal, built_in, column, dense, on_ranks, same_on_any_ranks, two_bricks,
+    two_bricks_by_metis,
+};
+use crate::scene::Scene;
+
+fn scenes() -> [Scene; 3] {
+    [two_bricks(&[]), two_bricks_by_metis(7), two_bricks(&["decomposition.cells=[1, 2, 2]"])]
+}
+
+/// A preconditioner at the elastic stiffness, and what it stands on.
+struct Case<'a> {
+    preconditioner: Preconditioner<'a>,
+    factors: Factors,
+    stiffnesses: Vec<Vec<f64>>,
+}
+
+impl<'a> Case<'a> {
+    fn new(setup: &'a Setup<'a>, dirichlet: bool, kept: impl Fn(usize) -> bool) -> Self {
+        let (factors, stiffnesses) = setup.factors();
+        let own = stiffnesses.len();
+        let interior = dirichlet.then(|| {
+            let whole = analyse(setup.subdomains());
+            let mut interior = InteriorFactors::new(interior::analyse(&whole, boundaries(&setup.gather, own)));
+            for (k, values) in stiffnesses.iter().enumerate() {
+                interior.factorise(k, k, values).expect("the interior is held by its boundary");
+            }
+            interior
+        });
+        let mut preconditioner = Preconditioner::new(&setup.gather, interior);
+        let diagonals: Vec<Vec<f64>> =
+            stiffnesses.iter().enumerate().map(|(k, values)| factors.symbolic(k).pattern.diagonal(values)).collect();
+        preconditioner.scaling = Scaling::new(&setup.discrete.constraints, &setup.gather, &diagonals, kept);
+        Self { preconditioner, factors, stiffnesses }
+    }
+
+    fn apply(&mut self, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; x.len()];
+        let Self { preconditioner, factors, stiffnesses } = self;
+        preconditioner.apply(|own| (&factors.symbolic(own).pattern, &stiffnesses[own][..]), x, &mut y);
+        y
+    }
+
+    fn stiffness(&self) -> Vec<Mat<f64>> {
+        let block = |(own, values): (usize, &Vec<f64>)| dense(&self.factors.symbolic(own).pattern, values);
+        self.stiffnesses.iter().enumerate().map(block).collect()
+    }
+}
+
+/// `(B D^-1 B')^-1 B D^-1` with the kept rows of `B`; the others are zero.
+fn dense_scaled_rows(b: &Mat<f64>, stiffness: &[Mat<f64>], kept: impl Fn(usize) -> bool) -> Mat<f64> {
+    let k = block_diagonal(stiffness);
+    let kept: Vec<usize> = (0..b.nrows()).filter(|&row| kept(row)).collect();
+    let some = Mat::from_fn(kept.len(), b.ncols(), |i, j| b[(kept[i], j)]);
+    let weighted = Mat::from_fn(kept.len(), b.ncols(), |i, j| some[(i, j)] / k[(j, j)]);
+    let scaled = (&weighted * some.transpose()).partial_piv_lu().solve(&weighted);
+    let mut all = Mat::zeros(b.nrows(), b.ncols());
+    for (i, &row) in kept.iter().enumerate() {
+        all.row_mut(row).copy_from(scaled.row(i));
+    }
+    all
+}
+
+/// The block of the boundary unknowns of each subdomain, less what its interior takes if it is free to move; zero
+/// elsewhere.
+fn dense_boundary_stiffness(stiffness: &[Mat<f64>], boundaries: &[Vec<u32>], interior_moves: bool) -> Mat<f64> {
+    let block = |(k, boundary): (&Mat<f64>, &Vec<u32>)| {
+        let inside: Vec<usize> = (0..k.nrows()).filter(|&dof| !boundary.contains(&(dof as u32))).collect();
+        let outside: Vec<usize> = boundary.iter().map(|&dof| dof as usize).collect();
+        let part = |rows: &[usize], columns: &[usize]| {
+            Mat::from_fn(rows.len(), columns.len(), |i, j| k[(rows[i], columns[j])])
+        };
+        let mut s = part(&outside, &outside);
+        if interior_moves && !inside.is_empty() {
+            let answer = part(&inside, &inside).partial_piv_lu().solve(part(&inside, &outside));
+            s -= part(&outside, &inside) * answer;
+        }
+        let mut whole = Mat::zeros(k.nrows(), k.nrows());
+        for (i, &row) in outside.iter().enumerate() {
+            for (j, &column) in outside.iter().enumerate() {
+                whole[(row, column)] = s[(i, j)];
+            }
+        }
+        whole
+    };
+    block_diagonal(&stiffness.iter().zip(boundaries).map(block).collect::<Vec<_>>())
+}
+
+#[test]
+fn lumped_and_dirichlet_equal_their_dense_formulas_with_all_rows_and_with_some() {
+    for scene in scenes() {
+        on_ranks(&scene, 1, |setup| {
+            let b = setup.dense_rows();
+            let odd_contact = |row: usize| matches!(setup.rows()[row].kind, Kind::Contact { pair } if pair % 2 == 1);
+            for (dirichlet, all) in [(false, true), (true, true), (true, false)] {
+                let kept = |row: usize| all || !odd_contact(row);
+                let mut case = Case::new(setup, dirichlet, kept);
+                let stiffness = case.stiffness();
+                let scaled = dense_scaled_rows(&b, &stiffness, kept);
+                let boundary = boundaries(&setup.gather, stiffness.len());
+                let s = dense_boundary_stiffness(&stiffness, &boundary, dirichlet);
+                let x = setup.multipliers(8);
+                let expected = &scaled * s * scaled.transpose() * column(&x);
+                assert_close(&column(&case.apply(&x)), &expected, 1e-11);
+                assert_eq!(case.preconditioner.applications(), 1);
+            }
+        });
+    }
+}
+
+/// `B B_D' = I`, by way of `(B D^-1 B') (B D^-1 B')^-1 = I`.
+#[test]
+fn scaled_rows_are_dual_to_the_rows() {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[])] {
+        on_ranks(&scene, 3, |setup| {
+            let case = Case::new(setup, false, |_| true);
+            let scaling = &case.preconditioner.scaling;
+            let x = setup.multipliers(9);
+            let mut solved = vec![0.0; x.len()];
+            scaling.solve(&x, &mut solved);
+            let mut torn = setup.gather.zeros();
+            setup.gather.add_transpose(1.0, &solved, &mut torn);
+            for (t, flexibility) in torn.iter_mut().zip(&scaling.flexibility) {
+                t.iter_mut().zip(flexibility).for_each(|(t, f)| *t *= f);
+            }
+            let mut back = vec![0.0; x.len()];
+            setup.gather.apply(&torn, &mut back);
+            assert_close(&column(&back), &column(&x), 1e-13);
+        });
+    }
+}
+
+#[test]
+fn the_preconditioned_operator_is_definite_on_symmetric_products() {
+    on_ranks(&two_bricks(&[]), 2, |setup| {
+        for dirichlet in [false, true] {
+            let mut case = Case::new(setup, dirichlet, |_| true);
+            let (x, y) = (setup.multipliers(1), setup.multipliers(2));
+            let (mx, my) = (case.apply(&x), case.apply(&y));
+            let [xmy, ymx, xmx] = setup.space.dots(&[(&x, &my), (&y, &mx), (&x, &mx)])[..] else { panic!() };
+            assert!((xmy - ymx).abs() < 1e-12 * xmx && xmx > 0.0);
+        }
+    });
+}
+
+#[test]
+fn mending_closes_the_defect_and_leaves_the_interior_without_force() {
+    for scene in scenes() {
+        for (ranks, dirichlet) in [(1, false), (1, true), (3, true)] {
+            on_ranks(&scene, ranks, |setup| {
+                let Case { mut preconditioner, factors, stiffnesses } = Case::new(setup, dirichlet, |_| true);
+                let mut u = setup.displacements(10);
+                let before = u.clone();
+                let wanted = setup.multipliers(11);
+                let mut bu = vec![0.0; wanted.len()];
+                setup.gather.apply(&u, &mut bu);
+                let defect: Vec<f64> = wanted.iter().zip(&bu).map(|(c, b)| c - b).collect();
+                let stiffness = |own: usize| (&factors.symbolic(own).pattern, &stiffnesses[own][..]);
+                preconditioner.mend(stiffness, &defect, &mut u);
+                setup.gather.apply(&u, &mut bu);
+                assert_close(&column(&bu), &column(&wanted), 1e-12);
+
+                let boundaries = boundaries(&setup.gather, u.len());
+                for (own, (after, before)) in u.iter().zip(&before).enumerate() {
+                    let moved: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
+                    let mut forces = vec![0.0; moved.len()];
+                    factors.symbolic(own).pattern.multiply_add(&stiffnesses[own], &moved, &mut forces);
+                    let largest = forces.iter().fold(0.0_f64, |size, f| size.max(f.abs()));
+                    for dof in (0..moved.len()).filter(|&dof| !boundaries[own].contains(&(dof as u32))) {
+                        let still = if dirichlet { forces[dof].abs() < 1e-12 * largest } else { moved[dof] == 0.0 };
+                        assert!(still, "interior unknown {dof} of subdomain {own}");
+                    }
+                }
+            });
+        }
+    }
+}
+
+#[test]
+fn images_are_the_same_bits_on_any_ranks() {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+        for dirichlet in [false, true] {
+            same_on_any_ranks(&scene, |setup| {
+                let image = Case::new(setup, dirichlet, |_| true).apply(&setup.multipliers(12));
+                setup.owned(&image)
+            });
+        }
+    }
+}
+
+/// `kappa(M F)` on `Ker G`: the eigenvalues of `M F` are those of `L' F L` with `M = L L'`.
+#[test]
+fn dirichlet_conditions_the_dual_operator_better_than_lumped_and_lumped_better_than_none() {
+    let scene = two_bricks(&[
+        "body.lower.brick.cells=[6, 3, 3]",
+        "body.upper.brick.cells=[6, 3, 3]",
+        "body.upper.brick.origin.0=0.0",
+        "decomposition.cells=[3, 3, 3]",
+    ]);
+    on_ranks(&scene, 1, |setup| {
+        let n = setup.rows().len();
+        let basis = (setup.dense_rows() * setup.dense_modes()).qr().compute_thin_Q();
+        let p = Mat::<f64>::identity(n, n) - &basis * basis.transpose();
+        let unit = |k: usize| (0..n).map(|i| f64::from(u8::from(i == k))).collect::<Vec<_>>();
+        let mut operator = DualOperator::new(setup.factors().0, &setup.gather);
+        let mut f = Mat::zeros(n, n);
+        for k in 0..n {
+            let mut image = vec![0.0; n];
+            operator.apply(&unit(k), &mut image);
+            f.col_mut(k).copy_from(column(&image).col(0));
+        }
+        let [none, lumped, dirichlet] = [None, Some(false), Some(true)].map(|dirichlet| {
+            let mut m = p.clone();
+            if let Some(dirichlet) = dirichlet {
+                let mut case = Case::new(setup, dirichlet, |_| true);
+                (0..n).for_each(|k| m.col_mut(k).copy_from(column(&case.apply(&unit(k))).col(0)));
+            }
+            let eigen = (&p * m * &p).self_adjoint_eigen(Side::Lower).expect("it exists");
+            let root = Mat::from_fn(n, n, |i, j| eigen.U()[(i, j)] * eigen.S()[j].max(0.0).sqrt());
+            let values = (root.transpose() * &f * root).self_adjoint_eigenvalues(Side::Lower).expect("they exist");
+            values[n - 1] / values[6 * setup.subdomains().len()]
+        });
+        assert!(2.0 * dirichlet < lumped && 2.0 * lumped < none, "{dirichlet} {lumped} {none}");
+    });
+}
