@@ -1,16 +1,63 @@
+//! `fetiplast`: see the crate's documentation and `fetiplast --help`.
+
+use std::process::exit;
+
+use clap::Parser;
+use fetiplast::cli::{Cli, Command, Failure, run};
 use fetiplast::comm::Comm;
+use fetiplast::comm::world::{EXIT_BUG, World};
+
+/// Exit code of a wrong command line (sysexits).
+const EXIT_USAGE: i32 = 64;
+
 fn main() {
-    let comm = fetiplast::comm::world::World::start().unwrap();
-    let args: Vec<String> = std::env::args().collect();
-    let level: usize = args.get(1).map_or(1, |s| s.parse().unwrap());
-    let scene = fetiplast::scene::Scene::load(args.get(2).map_or("two-blocks", |s| s), level, &args[3.min(args.len())..]).unwrap();
-    let m = fetiplast::monitor::timing::Timer::start();
-    let d = fetiplast::study::discretise(&scene, &comm).unwrap();
-    let rows = fetiplast::study::count_rows(&d, &comm);
-    if comm.rank() == 0 { println!("{:?} {}", rows, d.decomposition.shares.total()); }
-    let s = fetiplast::study::solve(&scene, &d, &comm, &m).unwrap();
-    if comm.rank() == 0 {
-        println!("{:?} J {:.12e} psi {:.9e} work {:.13e} plastic {} {:?}", s.outcome, s.energy, s.internal_energy, s.external_work, s.plastic_elements, s.residuals);
-        println!("{:.2} {:#?}", m.total_seconds(), fetiplast::monitor::timing::PhaseTable::gather(&fetiplast::comm::solo::Solo, &m));
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command.unwrap_or_else(Command::benchmark),
+        Err(error) => {
+            // Every rank fails alike; the launcher's first rank speaks, and without a launcher there is only one.
+            if launcher_rank().is_none_or(|rank| rank == "0") {
+                // A closed stream leaves nobody to tell.
+                let _ = error.print();
+            }
+            exit(if error.use_stderr() { EXIT_USAGE } else { 0 });
+        }
+    };
+    if let Some(answer) = command.answer() {
+        let speaks = launcher_rank().is_none_or(|rank| rank == "0");
+        exit(match answer {
+            Ok(text) => {
+                speaks.then(|| println!("{text}"));
+                0
+            }
+            Err(message) => {
+                speaks.then(|| eprintln!("fetiplast: {message}"));
+                EXIT_USAGE
+            }
+        });
     }
+    let Some(world) = World::start() else {
+        eprintln!("fetiplast: MPI cannot be started");
+        exit(EXIT_BUG);
+    };
+    if world.rank() == 0 {
+        let format = tracing_subscriber::fmt::format().without_time().with_target(false).with_level(false).compact();
+        tracing_subscriber::fmt().event_format(format).init();
+    }
+    let outcome = run(command, &world);
+    if let Err(failure) = &outcome
+        && world.rank() == 0
+    {
+        eprintln!("fetiplast: {failure}");
+    }
+    match outcome {
+        // After a failed collective write HDF5 may not let go of its file: end without taking leave.
+        Err(failure @ Failure::Output(_)) => world.abort(failure.code()),
+        Err(failure) => world.finish(failure.code()),
+        Ok(code) => world.finish(code),
+    }
+}
+
+/// This process' number by the launcher's environment (Open MPI, MPICH and SLURM), before MPI is up.
+fn launcher_rank() -> Option<String> {
+    ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "SLURM_PROCID"].iter().find_map(|name| std::env::var(name).ok())
 }

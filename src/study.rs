@@ -1,9 +1,11 @@
-//! The pipeline from a scene to a solution: the only file that sees every stage.
+//! The pipeline from a scene to results: the only file that sees every stage.
+
+use std::time::SystemTime;
 
 use thiserror::Error;
 
 use crate::assembly::loads::{self, Traction};
-use crate::comm::Comm;
+use crate::comm::{Comm, Shares, ordered_sum};
 use crate::constraint::{ConstraintError, Constraints, Kind, Support};
 use crate::contact::surface::GatheredSurface;
 use crate::contact::{ContactError, ContactPair, matching};
@@ -19,20 +21,27 @@ use crate::feti::projector::Projector;
 use crate::feti::space::RowSpace;
 use crate::material::Material;
 use crate::mesh::{Brick, Face};
+use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
-use crate::newton::{self, Settings, Solution, StepSettings, StepSolver, TornProblem};
+use crate::newton::{self, Settings, Solution, StepRecord, StepSettings, StepSolver, TornProblem};
 use crate::qp::mprgp::Expansion;
+use crate::results::agree::agree;
+use crate::results::fields::{self, ContactState};
+use crate::results::piece::Piece;
+use crate::results::summary::{Counters, NewtonRow, Residuals, Sizes, Summary};
+use crate::results::vtkhdf::Records;
+use crate::results::{provenance, summary};
 use crate::scene::{self, Scene, SurfaceName};
 
-/// Why a scene has no discrete problem.
+/// Why a scene has no discrete problem; the same on every rank.
 #[derive(Debug, Error)]
 pub enum StudyError {
     /// Contact surfaces cannot be paired.
     #[error(transparent)]
     Contact(#[from] ContactError),
     /// Supports contradict each other.
-    #[error(transparent)]
-    Constraint(#[from] ConstraintError),
+    #[error("{0}")]
+    Supports(String),
     /// Some body can move freely.
     #[error(transparent)]
     Floating(#[from] Floating),
@@ -61,12 +70,11 @@ pub struct Discrete {
 /// Discretises a scene. Collective.
 ///
 /// # Errors
-/// If contacts cannot be paired or supports contradict each other: the same error on every rank.
+/// If contacts cannot be paired or supports contradict each other.
 pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError> {
     let names: Vec<&String> = scene.body.keys().collect();
-    let bodies = decomposition::number_bodies(
-        scene.body.values().map(|b| Brick { origin: b.brick.origin, size: b.brick.size, cells: b.brick.cells }).collect(),
-    );
+    let brick = |b: &scene::Body| Brick { origin: b.brick.origin, size: b.brick.size, cells: b.brick.cells };
+    let bodies = decomposition::number_bodies(scene.body.values().map(brick).collect());
     let materials = scene.body.values().map(|b| material(&scene.material[&b.material])).collect();
     let surface = |name: &SurfaceName| Surface {
         body: names.iter().position(|n| **n == name.body).expect("a checked scene names its bodies"),
@@ -106,7 +114,8 @@ pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError
         })
         .collect();
     let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
-    let constraints = Constraints::new(comm, &decomposition, &supports, &pairs)?;
+    let constraints: Result<_, ConstraintError> = Constraints::new(comm, &decomposition, &supports, &pairs);
+    let constraints = agree(comm, "supports", constraints).map_err(StudyError::Supports)?;
     Ok(Discrete { bodies, materials, surfaces, decomposition, pairs, supports, tractions, constraints })
 }
 
@@ -114,29 +123,98 @@ fn material(m: &scene::Material) -> Material {
     Material { young: m.young, poisson: m.poisson, yield_stress: m.yield_stress, hardening: m.hardening }
 }
 
-/// Solves a discretised scene. Collective.
+/// Counts what a discrete problem consists of, in the paper's way. Collective.
+pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
+    let Discrete { decomposition, constraints, bodies, .. } = discrete;
+    let space = RowSpace::new(comm, &decomposition.shares, constraints);
+    let mut partial = Vec::new();
+    for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
+        let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0];
+        for &row in rows {
+            counts[match constraints.rows[row as usize].kind {
+                Kind::Gluing => 1,
+                Kind::Support { .. } => 2,
+                Kind::Contact { .. } => 3,
+            }] += 1.0;
+        }
+        partial.extend(counts);
+    }
+    let sum: Vec<u64> = space.sum(&partial, 4).into_iter().map(|n| n as u64).collect();
+    Sizes {
+        nodes: bodies.iter().map(|b| b.brick.node_count()).sum(),
+        cells: bodies.iter().map(|b| b.brick.cell_count()).sum(),
+        elements: bodies.iter().map(|b| b.brick.element_count()).sum(),
+        subdomains: decomposition.shares.total() as u64,
+        primal_dofs: sum[0],
+        gluing_rows: sum[1],
+        dirichlet_rows: sum[2],
+        contact_rows: sum[3],
+        dual_dofs: sum[1] + sum[2] + sum[3],
+    }
+}
+
+/// Memory that solving would take on all ranks together, in MiB: factors, tangents, multipliers and coarse problem.
+/// Subdomains of equal connectivity are analysed once. Collective.
+pub fn memory_estimate_mb(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> f64 {
+    let Discrete { decomposition, constraints, .. } = discrete;
+    let analysed = analyse(&decomposition.subdomains);
+    // The interior factor of the Dirichlet preconditioner is about a third of the whole one on cubes.
+    let factors = if scene.solver.preconditioner == scene::Preconditioner::Dirichlet { 1.35 } else { 1.0 };
+    let doubles: f64 = analysed
+        .iter()
+        .map(|s| {
+            factors * s.factor_length() as f64 + 1.5 * s.pattern.rows.len() as f64 + 12.0 * s.pattern.dofs() as f64
+        })
+        .sum();
+    // A row of G' and a row's terms; the coarse factor is small beside them.
+    let slots = 12.0 * constraints.slot_subdomain.len() as f64;
+    let mine = 8.0 * (doubles + slots) / f64::from(1 << 20);
+    ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0] + PROCESS_MB * comm.size() as f64
+}
+
+/// What a process takes before it holds anything (MPI, HDF5), in MiB.
+const PROCESS_MB: f64 = 30.0;
+
+/// What a solved scene gives.
+pub struct Solved {
+    /// Numbers for scripts: sizes, counts, forces, energies, residuals.
+    pub summary: Summary,
+    /// This rank's mesh and fields.
+    pub piece: Piece,
+    /// What is stored beside the fields.
+    pub records: Records,
+}
+
+/// Solves a discretised scene; `report` is told of every Newton step. Collective.
 ///
 /// # Errors
-/// If the constraints leave a rigid motion free: on every rank.
-pub fn solve(scene: &Scene, discrete: &Discrete, comm: &dyn Comm, timer: &Timer) -> Result<Solution, StudyError> {
+/// If the constraints leave a rigid motion free.
+pub fn solve(
+    scene: &Scene,
+    discrete: &Discrete,
+    comm: &dyn Comm,
+    timer: &Timer,
+    report: &mut dyn FnMut(Event),
+) -> Result<Solved, StudyError> {
+    let started = SystemTime::now();
     let Discrete { decomposition, constraints, .. } = discrete;
     let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains[..]);
     let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
     let space = RowSpace::new(comm, shares, constraints);
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
-    let coarse = timer.time("coarse setup", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
+    let coarse = timer.time("coarse set-up", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
     let interior = || {
         let boundaries = preconditioner::boundaries(&gather, subdomains.len());
         InteriorFactors::new(interior::analyse(&symbolic, boundaries))
     };
-    let interior = match scene.solver.preconditioner {
+    let preconditioner = match scene.solver.preconditioner {
         scene::Preconditioner::None => None,
-        scene::Preconditioner::Lumped => Some(None),
-        scene::Preconditioner::Dirichlet => Some(Some(timer.time("symbolic analysis", interior))),
+        scene::Preconditioner::Lumped => Some(Preconditioner::new(&gather, None)),
+        scene::Preconditioner::Dirichlet => {
+            Some(Preconditioner::new(&gather, Some(timer.time("symbolic analysis", interior))))
+        }
     };
-    let preconditioner = interior.map(|interior| Preconditioner::new(&gather, interior));
-    let factors = Factors::new(symbolic);
     let mut loads = gather.zeros();
     for (subdomain, f) in subdomains.iter().zip(&mut loads) {
         loads::add_tractions(subdomain, &discrete.tractions, f);
@@ -160,27 +238,151 @@ pub fn solve(scene: &Scene, discrete: &Discrete, comm: &dyn Comm, timer: &Timer)
             scene::Expansion::Fixed => Expansion::Fixed,
         },
     };
-    let settings =
-        Settings { tolerance: solver.newton_tolerance, residual: solver.residual_tolerance, limit: solver.newton_limit };
-    let mut steps = StepSolver::new(DualOperator::new(factors, &gather), Projector { coarse }, preconditioner, step, subdomains.len());
-    Ok(newton::solve(&problem, &mut steps, &settings, timer, &mut |r| println!("{r:?}")))
+    let settings = Settings {
+        tolerance: solver.newton_tolerance,
+        residual: solver.residual_tolerance,
+        limit: solver.newton_limit,
+    };
+    let operator = DualOperator::new(Factors::new(symbolic), &gather);
+    let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, step, subdomains.len());
+    let solution = newton::solve(&problem, &mut steps, &settings, timer, &mut |record| {
+        report(Event::NewtonStep(newton_row(record)))
+    });
+
+    let contact = contact_states(&problem, &solution);
+    let piece = fields::piece(decomposition, &discrete.materials, &solution.u, &discrete.pairs, &contact, comm.rank());
+    let summary = summarise(scene, discrete, &problem, &solution, &contact, comm);
+    let records = Records {
+        provenance: provenance::collect(comm, &scene.to_toml(), shares, started),
+        convergence: convergence(&summary.newton),
+    };
+    Ok(Solved { summary, piece, records })
 }
 
-/// Numbers of gluing, support and contact rows over all ranks. Collective.
-pub fn count_rows(discrete: &Discrete, comm: &dyn Comm) -> [usize; 3] {
-    let space = RowSpace::new(comm, &discrete.decomposition.shares, &discrete.constraints);
-    let mut partial = Vec::new();
-    for rows in space.owned() {
-        let mut counts = [0.0; 3];
-        for &row in rows {
-            counts[match discrete.constraints.rows[row as usize].kind {
-                Kind::Gluing => 0,
-                Kind::Support { .. } => 1,
-                Kind::Contact { .. } => 2,
-            }] += 1.0;
-        }
-        partial.extend(counts);
+fn newton_row(record: &StepRecord) -> NewtonRow {
+    NewtonRow {
+        step: record.number as u64,
+        criterion: record.criterion,
+        residual: record.residual,
+        damping: record.damping,
+        plastic_elements: record.plastic_elements as u64,
+        active_contacts: record.active_contacts as u64,
+        energy: record.energy,
+        qp_iterations: record.statistics.outer as u64,
+        hessian_multiplications: record.applications as u64,
+        factorisations: record.factorisations as u64,
+        seconds: record.seconds,
     }
-    let sum = space.sum(&partial, 3);
-    [0, 1, 2].map(|k| sum[k] as usize)
+}
+
+/// The Newton steps as columns of a table.
+fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
+    let column = |name: &str, value: fn(&NewtonRow) -> f64| (name.to_owned(), rows.iter().map(value).collect());
+    vec![
+        column("criterion", |r| r.criterion),
+        column("residual", |r| r.residual),
+        column("damping", |r| r.damping),
+        column("energy", |r| r.energy),
+        column("plastic_elements", |r| r.plastic_elements as f64),
+        column("active_contacts", |r| r.active_contacts as f64),
+        column("hessian_multiplications", |r| r.hessian_multiplications as f64),
+        column("factorisations", |r| r.factorisations as f64),
+    ]
+}
+
+/// Contact of every pair whose row is on this rank.
+fn contact_states(problem: &TornProblem, solution: &Solution) -> Vec<ContactState> {
+    let slack = problem.slack(&solution.u);
+    let rows = problem.constraints.rows.iter().zip(&slack).zip(&solution.lambda);
+    rows.filter_map(|((row, slack), lambda)| {
+        let Kind::Contact { pair } = row.kind else { return None };
+        Some(ContactState { pair, force: row.scale * lambda, gap: slack / row.scale })
+    })
+    .collect()
+}
+
+/// The numbers of a run; what belongs to the whole run (times, scene name, ranks) is filled in by the caller.
+fn summarise(
+    scene: &Scene,
+    discrete: &Discrete,
+    problem: &TornProblem,
+    solution: &Solution,
+    contact: &[ContactState],
+    comm: &dyn Comm,
+) -> Summary {
+    let sizes = sizes(discrete, comm);
+    let space = problem.space;
+    let reactions = problem.reactions(&solution.u, &solution.lambda, discrete.supports.len());
+    let names = discrete.supports.iter().map(|s| s.name.clone());
+    let maximum = |x: f64| space.maximum(x);
+    let total = |count: fn(&StepRecord) -> usize| Some(solution.steps.iter().map(count).sum::<usize>() as u64);
+    let is_smalse = scene.solver.qp == scene::Qp::SmalseM && problem.constraints.has_inequalities;
+    let is_active_set = scene.solver.qp == scene::Qp::ActiveSet && problem.constraints.has_inequalities;
+    let outer = total(|s| s.statistics.outer);
+    Summary {
+        title: scene.title.clone(),
+        converged: Some(solution.outcome == newton::Outcome::Converged),
+        plastic_elements: Some(solution.plastic_elements as u64),
+        plastic_fraction: Some(solution.plastic_elements as f64 / sizes.elements as f64),
+        newton_iterations: Some(solution.steps.len() as u64),
+        qp: qp_name(scene, problem.constraints.has_inequalities).to_owned(),
+        counters: Counters {
+            smalse_iterations: outer.filter(|_| is_smalse),
+            active_set_iterations: outer.filter(|_| is_active_set),
+            dual_iterations: total(|s| s.statistics.cg + s.statistics.expansions + s.statistics.proportionings),
+            hessian_multiplications: total(|s| s.applications),
+            preconditioner_applications: total(|s| s.statistics.preconditioner),
+            factorisations: total(|s| s.factorisations),
+        },
+        active_contacts: Some(problem.active_contacts(&solution.lambda) as u64),
+        contact_force: Some(contact_force(problem, &discrete.pairs, contact)),
+        reactions: names.zip(reactions).collect(),
+        external_work: Some(solution.external_work),
+        internal_energy: Some(solution.internal_energy),
+        energy: Some(solution.energy),
+        max_displacement: Some(maximum(newton::residuals::largest_displacement(&solution.u))),
+        max_von_mises: Some(maximum(fields::largest_von_mises(
+            &discrete.decomposition,
+            &discrete.materials,
+            &solution.u,
+        ))),
+        residuals: Residuals {
+            equilibrium: Some(solution.residuals.equilibrium),
+            gluing: Some(solution.residuals.gluing),
+            gap: Some(solution.residuals.gap),
+            complementarity: Some(solution.residuals.complementarity),
+        },
+        error: solution.outcome.message(),
+        newton: solution.steps.iter().map(newton_row).collect(),
+        sizes,
+        ..summary::Summary::default()
+    }
+}
+
+/// The solver of the quadratic programs, by its name in scene files.
+fn qp_name(scene: &Scene, has_inequalities: bool) -> &'static str {
+    match scene.solver.qp {
+        _ if !has_inequalities => "pcpg",
+        scene::Qp::SmalseM => "smalse-m",
+        scene::Qp::ActiveSet => "active-set",
+    }
+}
+
+/// Force that the master surfaces exert on the slaves, all contacts together.
+fn contact_force(problem: &TornProblem, pairs: &[ContactPair], contact: &[ContactState]) -> [f64; 3] {
+    let mut of_pair = vec![None; pairs.len()];
+    contact.iter().for_each(|state| of_pair[state.pair] = Some(state.force));
+    let mut partial = Vec::new();
+    for rows in problem.space.owned() {
+        let mut sum = [0.0; 3];
+        for &row in rows {
+            if let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind {
+                let force = of_pair[pair].unwrap_or_default();
+                (0..3).for_each(|a| sum[a] -= force * pairs[pair].normal[a]);
+            }
+        }
+        partial.extend(sum);
+    }
+    let sum = problem.space.sum(&partial, 3);
+    [sum[0], sum[1], sum[2]]
 }

@@ -36,6 +36,13 @@ impl World {
         Some(Self { world, _universe: universe })
     }
 
+    /// Waits for the other ranks, shuts MPI down and ends this process with an exit code.
+    pub fn finish(self, code: i32) -> ! {
+        self.world.barrier();
+        drop(self);
+        std::process::exit(code)
+    }
+
     /// Ends every rank at once with an exit code.
     pub fn abort(&self, code: i32) -> ! {
         self.world.abort(code)

@@ -4,7 +4,7 @@ use super::{Facet, Subdomain};
 use crate::comm::threads;
 use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis};
 use crate::scene::Scene;
-use crate::study::{count_rows, discretise};
+use crate::study::{discretise, sizes};
 
 /// Bricks and METIS, one body and two, few elements a part and many.
 fn scenes() -> Vec<Scene> {
@@ -32,7 +32,8 @@ fn sizes_are_those_of_the_papers_table_2() {
             let discrete = discretise(&scene, comm).unwrap();
             let nodes: u64 = discrete.bodies.iter().map(|body| body.brick.node_count()).sum();
             assert_eq!((nodes, discrete.decomposition.shares.total()), (nodes, subdomains));
-            assert_eq!(count_rows(&discrete, comm), rows);
+            let found = sizes(&discrete, comm);
+            assert_eq!([found.gluing_rows, found.dirichlet_rows, found.contact_rows], rows);
             let own = &discrete.decomposition.subdomains;
             (nodes, own.len(), own.iter().map(Subdomain::dofs).sum::<usize>())
         });

@@ -17,6 +17,11 @@ pub enum Event {
         /// Sizes of the problem.
         sizes: Sizes,
     },
+    /// What a run would take, from `check`.
+    Memory {
+        /// All ranks together, in MiB.
+        megabytes: f64,
+    },
     /// The QP solver is at work; sent as often as it likes.
     Inner {
         /// Newton step, from 1.

@@ -28,6 +28,9 @@ impl Plain {
     fn lines(&mut self, event: &Event) -> Vec<String> {
         match event {
             Event::Sizes { scene, level, ranks, sizes } => size_lines(scene, *level, *ranks, sizes),
+            Event::Memory { megabytes } => {
+                vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together", "memory estimate")]
+            }
             Event::NewtonStep(row) => {
                 let header = (!std::mem::replace(&mut self.newton_header_written, true)).then(newton_header);
                 header.into_iter().chain([newton_line(row)]).collect()
@@ -118,6 +121,8 @@ mod tests {
             damping: 1.0,
             plastic_elements: 6813,
             active_contacts: 70,
+            energy: -1.0,
+            factorisations: 4,
             qp_iterations: 25,
             hessian_multiplications: 325,
             seconds: 1.234,

@@ -51,8 +51,8 @@ pub fn search(
     }
     let first_slope = problem.slope(state, du);
     // Below this, energies differ by round-off only.
-    let noise = 1e-12 * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs());
-    eprintln!("slope0 {first_slope:e} slope1 {:e} dJ {:e} noise {noise:e}", problem.slope(&full.state, du), full.state.energy - state.energy);
+    let noise =
+        1e-12 * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs());
     let lowers = |t: &Damped| t.state.energy <= state.energy + SUFFICIENT * t.length * first_slope.min(0.0) + noise;
     if lowers(&full) {
         return Some(full);

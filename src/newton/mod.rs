@@ -5,6 +5,7 @@
 
 pub mod damping;
 pub mod dual;
+pub mod forcing;
 pub mod problem;
 pub mod recover;
 pub mod residuals;
@@ -17,6 +18,10 @@ pub use step::{StepSettings, StepSolver};
 use crate::feti::Torn;
 use crate::monitor::timing::Timer;
 use crate::qp;
+use forcing::Forcing;
+
+/// How often a step that does not lower the energy is tried again, more exactly each time.
+const ATTEMPTS: usize = 3;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,25 +134,39 @@ pub fn solve(
     let mut residuals = problem.residuals(&u, &state, &lambda);
     let mut steps = Vec::new();
     let mut admissible = problem.is_admissible(&u);
+    let mut forcing = Forcing::default();
+    let mut attempts: Vec<step::Step> = Vec::new();
     let outcome = loop {
         let watch = timer.total_seconds();
-        let step = match solver.solve(problem, &u, &state, timer) {
+        let step = match solver.solve(problem, &u, &state, forcing, timer) {
             Ok(step) => step,
             Err(message) => break Outcome::Singular(message),
         };
         if !matches!(step.outcome, qp::Outcome::Converged | qp::Outcome::LimitReached) {
-            break if step.outcome == qp::Outcome::NotFinite { Outcome::NotFinite } else { Outcome::Inner(step.outcome) };
+            break if step.outcome == qp::Outcome::NotFinite {
+                Outcome::NotFinite
+            } else {
+                Outcome::Inner(step.outcome)
+            };
         }
         // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
         let Some(damped) = damping::search(problem, &u, &state, &step.du, admissible, timer) else {
-            break if state.energy.is_finite() { Outcome::Stalled } else { Outcome::NotFinite };
+            if !state.energy.is_finite() || attempts.len() >= ATTEMPTS {
+                break if state.energy.is_finite() { Outcome::Stalled } else { Outcome::NotFinite };
+            }
+            // Perhaps the program was solved too loosely for a descent direction.
+            forcing.tighten();
+            attempts.push(step);
+            continue;
         };
         let criterion = problem.relative_change(&u, &damped.u);
         u = damped.u;
         state = damped.state;
         lambda = step.lambda;
         admissible = true;
+        let before = residuals.largest();
         residuals = timer.time("residuals", || problem.residuals(&u, &state, &lambda));
+        forcing.update(before, residuals.largest(), settings.residual, step.at_floor);
         let record = StepRecord {
             number: steps.len() + 1,
             criterion,
@@ -156,11 +175,12 @@ pub fn solve(
             energy: state.energy,
             plastic_elements: state.plastic,
             active_contacts: problem.active_contacts(&lambda),
-            statistics: step.statistics,
-            applications: step.applications,
-            factorisations: step.factorisations,
+            statistics: attempts.iter().fold(step.statistics, |sum, attempt| sum + attempt.statistics),
+            applications: step.applications + attempts.iter().map(|a| a.applications).sum::<usize>(),
+            factorisations: step.factorisations + attempts.iter().map(|a| a.factorisations).sum::<usize>(),
             seconds: timer.total_seconds() - watch,
         };
+        attempts.clear();
         report(&record);
         steps.push(record);
         if !(criterion.is_finite() && state.energy.is_finite()) {

@@ -131,12 +131,8 @@ impl TornProblem<'_> {
             let kind = self.constraints.rows[row as usize].kind;
             matches!(kind, Kind::Contact { .. }) && lambda[row as usize] > 0.0
         };
-        let partial: Vec<f64> = self
-            .space
-            .owned()
-            .iter()
-            .map(|rows| rows.iter().filter(|&&row| active(row)).count() as f64)
-            .collect();
+        let partial: Vec<f64> =
+            self.space.owned().iter().map(|rows| rows.iter().filter(|&&row| active(row)).count() as f64).collect();
         self.space.sum(&partial, 1)[0] as usize
     }
 }

@@ -88,7 +88,8 @@ impl TornProblem<'_> {
     }
 
     /// Force of each support on the bodies, `[support][component]`. Collective.
-    pub fn reactions(&self, state: &State, lambda: &[f64], supports: usize) -> Vec<[f64; 3]> {
+    pub fn reactions(&self, u: &Torn, lambda: &[f64], supports: usize) -> Vec<[f64; 3]> {
+        let state = &self.evaluate(u);
         let mut rows = vec![0.0; self.gather.rows()];
         self.gather.apply(&self.unbalanced(state, lambda), &mut rows);
         let mut partial = vec![0.0; 3 * supports * self.space.owned().len()];

@@ -5,8 +5,9 @@
 //! zero and its right-hand side `B K^+ (f_k - B'l0) - c_k` costs one application of F.
 
 use super::dual::{Dual, Multipliers};
+use super::forcing::Forcing;
 use super::problem::{State, TornProblem};
-use super::recover;
+use super::recover::{self, CoarseFace};
 use crate::assembly::stiffness;
 use crate::feti::Torn;
 use crate::feti::factor::NotDefinite;
@@ -17,8 +18,8 @@ use crate::feti::scaling::Scaling;
 use crate::monitor::timing::Timer;
 use crate::qp::bounds::Bounds;
 use crate::qp::mprgp::Expansion;
-use crate::qp::quadratic::{Projection, Space};
 use crate::qp::pcpg::Pcpg;
+use crate::qp::quadratic::Space;
 use crate::qp::{Limits, Outcome, Statistics, power, smalse};
 
 /// How to solve the quadratic programs.
@@ -42,6 +43,8 @@ pub struct Step {
     pub outcome: Outcome,
     /// What it took.
     pub statistics: Statistics,
+    /// Whether it was solved to the tolerance of the scene.
+    pub at_floor: bool,
     /// Applications of F, those around the quadratic program included.
     pub applications: usize,
     /// Subdomains factorised, over all ranks.
@@ -58,7 +61,8 @@ pub struct StepSolver<'a> {
     tangents: Vec<Vec<f64>>,
     /// How many elements of each own subdomain yield; none before the first step.
     yielding: Vec<Option<usize>>,
-    lambda: Option<Vec<f64>>,
+    /// Multipliers of the last step, and the coarse problem of the rows that it held.
+    last: Option<(Vec<f64>, CoarseFace)>,
     reference: Option<f64>,
     norm: Option<f64>,
 }
@@ -73,14 +77,31 @@ impl<'a> StepSolver<'a> {
         own: usize,
     ) -> Self {
         let (tangents, yielding) = (vec![Vec::new(); own], vec![None; own]);
-        Self { operator, projector, preconditioner, settings, tangents, yielding, lambda: None, reference: None, norm: None }
+        Self {
+            operator,
+            projector,
+            preconditioner,
+            settings,
+            tangents,
+            yielding,
+            last: None,
+            reference: None,
+            norm: None,
+        }
     }
 
     /// Solves for the step at `u`. Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent or the coarse problem is singular.
-    pub fn solve(&mut self, problem: &TornProblem, u: &Torn, state: &State, timer: &Timer) -> Result<Step, String> {
+    pub fn solve(
+        &mut self,
+        problem: &TornProblem,
+        u: &Torn,
+        state: &State,
+        forcing: Forcing,
+        timer: &Timer,
+    ) -> Result<Step, String> {
         let before = self.operator.applications();
         let factorisations = self.update_tangents(problem, u, timer)?;
         let rows = problem.gather.rows();
@@ -96,7 +117,7 @@ impl<'a> StepSolver<'a> {
         timer.time("dual operator", || self.operator.respond(&start, &mut torn, &mut b));
         b.iter_mut().zip(&slack).for_each(|(b, s)| *b -= s);
 
-        let (mut x, outcome, statistics) = self.solve_dual(problem, &start, &b, timer);
+        let Inner { mut x, outcome, statistics, at_floor } = self.solve_dual(problem, &start, &b, forcing, timer);
         let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
 
         timer.time("coarse problem", || self.projector.project(&mut x));
@@ -105,22 +126,16 @@ impl<'a> StepSolver<'a> {
         let mut defect = vec![0.0; rows];
         timer.time("dual operator", || self.operator.respond(&x, &mut du, &mut defect));
         defect.iter_mut().zip(&slack).for_each(|(d, s)| *d = s - *d);
-        let kept: Vec<bool> =
-            problem.constraints.rows.iter().zip(&lambda).map(|(row, &l)| !row.is_inequality() || l > 0.0).collect();
-        timer
-            .time("coarse problem", || {
-                recover::add_rigid_motion(problem, &self.projector.coarse, &kept, &defect, &mut du)
-            })
+        let held = problem.constraints.rows.iter().zip(&lambda).map(|(row, &l)| !row.is_inequality() || l > 0.0);
+        let coarse = &self.projector.coarse;
+        let face = timer
+            .time("coarse problem", || CoarseFace::new(coarse, held.collect()))
             .map_err(|floating| floating.to_string())?;
-        let nrm=|d: &Torn| { let mut r = vec![0.0; rows]; problem.gather.apply(d, &mut r); let mut e=0.0; let mut c=0.0_f64; for ((r,s),row) in r.iter().zip(&slack).zip(&problem.constraints.rows) { if row.is_inequality() { c=c.max(r-s) } else { e+=(r-s)*(r-s) } } (e.sqrt(),c) };
-        let mut kk=0.0; let mut fd=0.0; for own in 0..du.len() { let mut y=vec![0.0;du[own].len()]; self.operator.factors.symbolic(own).pattern.multiply_add(&self.tangents[own],&du[own],&mut y); for i in 0..y.len(){ kk+=y[i]*du[own][i]; fd += (problem.loads[own][i]-state.forces[own][i])*du[own][i]; } }
-        eprintln!("before mend {:?} model {:e} {:e} J {:e}", nrm(&du), kk, fd, 0.5*kk-fd);
+        recover::add_rigid_motion(problem, &face.amplitudes(coarse, &defect), &mut du);
         self.mend(problem, &slack, &mut du, timer);
-        let mut kk=0.0; let mut fd=0.0; for own in 0..du.len() { let mut y=vec![0.0;du[own].len()]; self.operator.factors.symbolic(own).pattern.multiply_add(&self.tangents[own],&du[own],&mut y); for i in 0..y.len(){ kk+=y[i]*du[own][i]; fd += (problem.loads[own][i]-state.forces[own][i])*du[own][i]; } }
-        eprintln!("after mend {:?} model {:e} {:e} J {:e}", nrm(&du), kk, fd, 0.5*kk-fd);
-        self.lambda = Some(lambda.clone());
+        self.last = Some((lambda.clone(), face));
         let applications = self.operator.applications() - before;
-        Ok(Step { du, lambda, outcome, statistics, applications, factorisations })
+        Ok(Step { du, lambda, outcome, statistics, at_floor, applications, factorisations })
     }
 
     /// Closes what the dual solver's tolerance left open, at the least cost in energy that the preconditioner knows.
@@ -144,15 +159,16 @@ impl<'a> StepSolver<'a> {
             mine.extend(modes.resultants(&subdomain.points, f));
         }
         let mut imbalance = coarse.share(&mine);
-        let mut start = self.lambda.clone().unwrap_or_else(|| vec![0.0; problem.gather.rows()]);
+        let mut start = self.last.as_ref().map_or_else(|| vec![0.0; problem.gather.rows()], |(l, _)| l.clone());
         let balance = coarse.apply(&start);
         imbalance.iter_mut().zip(balance).for_each(|(e, b)| *e -= b);
-        coarse.solve(&mut imbalance);
-        coarse.add_transpose(1.0, &imbalance, &mut start);
-        if self.lambda.is_some() {
-            // The correction was round-off or the last tolerance: it must not push contact forces below zero.
-            let contacts = problem.constraints.rows.iter().zip(&mut start).filter(|(row, _)| row.is_inequality());
-            contacts.for_each(|(_, l)| *l = l.max(0.0));
+        match &self.last {
+            // Open contacts stay open.
+            Some((_, face)) => face.add_balance(coarse, imbalance, &mut start),
+            None => {
+                coarse.solve(&mut imbalance);
+                coarse.add_transpose(1.0, &imbalance, &mut start);
+            }
         }
         start
     }
@@ -177,7 +193,9 @@ impl<'a> StepSolver<'a> {
             let outcome = timer.time("factorisation", || self.operator.factors.factorise(own, subdomain, values));
             let interior = self.preconditioner.as_mut().and_then(|p| p.interior.as_mut());
             let outcome = outcome.and_then(|()| match interior {
-                Some(factors) => timer.time("factorisation of the interior", || factors.factorise(own, subdomain.id, values)),
+                Some(factors) => {
+                    timer.time("factorisation of the interior", || factors.factorise(own, subdomain.id, values))
+                }
                 None => Ok(()),
             });
             failure = outcome.err();
@@ -197,8 +215,8 @@ impl<'a> StepSolver<'a> {
                 .enumerate()
                 .map(|(own, values)| self.operator.factors.symbolic(own).pattern.diagonal(values))
                 .collect();
-            preconditioner.scaling = timer
-                .time("scaling", || Scaling::new(problem.constraints, problem.gather, &diagonals, |_| true));
+            preconditioner.scaling =
+                timer.time("scaling", || Scaling::new(problem.constraints, problem.gather, &diagonals, |_| true));
         }
         Ok(problem.space.sum(&factorised, 1)[0] as usize)
     }
@@ -209,8 +227,9 @@ impl<'a> StepSolver<'a> {
         problem: &TornProblem,
         start: &[f64],
         b: &[f64],
+        forcing: Forcing,
         timer: &Timer,
-    ) -> (Vec<f64>, Outcome, Statistics) {
+    ) -> Inner {
         let space = Multipliers(problem.space, timer);
         let mut dual = Dual {
             operator: &mut self.operator,
@@ -219,40 +238,61 @@ impl<'a> StepSolver<'a> {
             tangents: &self.tangents,
             timer,
         };
-        let mut x = vec![0.0; b.len()];
         let mut projected = b.to_vec();
-        dual.project(&mut projected);
-        let size = space.norm(&projected);
-        if size == 0.0 {
-            return (x, Outcome::Converged, Statistics::default());
+        let mean = timer.time("coarse problem", || self.projector.project(&mut projected));
+        let mut x = vec![0.0; b.len()];
+        if space.norm(&projected) == 0.0 {
+            return Inner { x, outcome: Outcome::Converged, statistics: Statistics::default(), at_floor: true };
         }
-        eprintln!("size {size:e}");
         let limits = Limits {
-            relative: self.settings.tolerance,
-            reference: Some(*self.reference.get_or_insert(size)),
-            absolute: size * std::env::var("ETA").map_or(0.0, |s| s.parse().unwrap()),
+            relative: self.settings.tolerance * forcing.floor,
+            reference: self.reference,
+            absolute: 0.0,
+            drop: if problem.is_linear() { 0.0 } else { forcing.drop },
             products: self.settings.products,
         };
+        let at_floor = |first: f64| limits.relative * self.reference.unwrap_or(first) >= limits.drop * first;
         if !problem.constraints.has_inequalities {
             let report = Pcpg::new(&space).solve(&mut dual, &mut x, &mut projected, &limits);
-            return (x, report.outcome, report.statistics);
+            let at_floor = at_floor(report.first_norm);
+            self.reference.get_or_insert(report.first_norm);
+            return Inner { x, outcome: report.outcome, statistics: report.statistics, at_floor };
         }
         let mut statistics = Statistics::default();
-            if self.norm.is_none() || std::env::var("RENORM").is_ok() {
-        let Some(estimate) = power::norm(&space, &mut dual, &projected) else {
-            return (x, Outcome::NotFinite, Statistics::default());
-        };
-        statistics.hessian += estimate.products;
-        self.norm = Some(estimate.norm);
+        if self.norm.is_none() {
+            let Some(estimate) = power::norm(&space, &mut dual, &projected) else {
+                return Inner { x, outcome: Outcome::NotFinite, statistics, at_floor: false };
+            };
+            statistics.hessian += estimate.products;
+            self.norm = Some(estimate.norm);
         }
+        // Open contacts are part of b, but not of the rigid motion: the last step's set tells them apart.
+        let multiplier = self.last.as_ref().map(|(_, face)| {
+            let mut a = face.amplitudes(&self.projector.coarse, b);
+            a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
+            let mut multiplier = vec![0.0; b.len()];
+            self.projector.coarse.add_transpose(1.0, &a, &mut multiplier);
+            multiplier
+        });
         let contacts = problem.constraints.rows.iter().zip(start);
         let lower = contacts.map(|(row, l)| if row.is_inequality() { -l } else { f64::NEG_INFINITY }).collect();
+        let norm = self.norm.unwrap_or(f64::NAN);
         let solution = smalse::solve(
             smalse::Problem { space: &space, function: &mut dual, b: &projected, bounds: &Bounds::new(lower) },
-            &smalse::Settings { limits, norm: self.norm.unwrap(), expansion: self.settings.expansion },
-            smalse::Start { x, multiplier: None },
+            &smalse::Settings { limits, norm, expansion: self.settings.expansion },
+            smalse::Start { x, multiplier },
         );
+        let at_floor = at_floor(solution.first_norm);
+        self.reference.get_or_insert(solution.first_norm);
         statistics += solution.statistics;
-        (solution.x, solution.outcome, statistics)
+        Inner { x: solution.x, outcome: solution.outcome, statistics, at_floor }
     }
+}
+
+/// Solution of the shifted program.
+struct Inner {
+    x: Vec<f64>,
+    outcome: Outcome,
+    statistics: Statistics,
+    at_floor: bool,
 }

@@ -110,7 +110,7 @@ impl Run<'_> {
             loop {
                 let products = limits.products.saturating_sub(self.statistics.hessian);
                 let relative = if strict { 0.0 } else { LOOSE };
-                let loose = Limits { relative, reference: None, absolute: target, products };
+                let loose = Limits { relative, reference: None, absolute: target, drop: 0.0, products };
                 let report = solver.solve(face, &mut self.x, &mut self.residual, &loose);
                 self.statistics += report.statistics;
                 self.norm = report.norm;
@@ -188,7 +188,7 @@ mod tests {
     use super::super::torn::{Torn, homogenised};
     use super::*;
 
-    const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, products: 2000 };
+    const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
 
     fn from(torn: &mut Torn, x: Vec<f64>, kept: Vec<bool>, limits: &Limits) -> Solution {
         let (d, bounded) = (torn.d.clone(), torn.bounded.clone());

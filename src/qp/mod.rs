@@ -68,23 +68,35 @@ impl std::ops::AddAssign for Statistics {
     }
 }
 
+impl std::ops::Add for Statistics {
+    type Output = Self;
+
+    fn add(mut self, other: Self) -> Self {
+        self += other;
+        self
+    }
+}
+
 /// When to stop: a gradient norm of `max(relative * reference, absolute)` is small enough.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Tolerance relative to the reference.
     pub relative: f64,
-    /// What the relative tolerance refers to; if absent the norm of P b (SMALSE-M) or of the first residual (PCPG).
+    /// What the relative tolerance refers to; if absent the first projected gradient.
     pub reference: Option<f64>,
     /// Tolerance in the units of the gradient.
     pub absolute: f64,
+    /// Tolerance relative to the gradient norm at the start, for who wants that reduced and no more; 0 to reach the
+    /// others.
+    pub drop: f64,
     /// Products with A that may be spent.
     pub products: usize,
 }
 
 impl Limits {
-    /// The gradient norm to reach, where `fallback` is the reference if the caller gave none.
-    fn target(&self, fallback: f64) -> f64 {
-        (self.relative * self.reference.unwrap_or(fallback)).max(self.absolute)
+    /// The gradient norm to reach from `first`.
+    fn target(&self, first: f64) -> f64 {
+        (self.relative * self.reference.unwrap_or(first)).max(self.absolute).max(self.drop * first)
     }
 }
 

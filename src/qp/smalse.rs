@@ -25,7 +25,7 @@ const PENALTY: f64 = 100.0;
 const BALANCE: f64 = 10.0;
 /// Factor by which M shrinks.
 const SHRINK: f64 = 10.0;
-/// First bound eta of the inner tolerance, times |P b|.
+/// First bound eta of the inner tolerance, times the first projected gradient.
 const LOOSE: f64 = 0.1;
 /// Converged with a gradient updated more often than this: it is computed afresh before it is believed.
 const AGE: usize = 50;
@@ -45,7 +45,7 @@ pub struct Problem<'a> {
 /// How to solve it.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// Tolerances for |g^P| and norm |Q x|, both referred to |P b| by default.
+    /// Tolerances for |g^P| and norm |Q x|, both referred to the first |g^P| by default.
     pub limits: Limits,
     /// Estimate of the norm of P A P, see [`super::power`].
     pub norm: f64,
@@ -75,6 +75,8 @@ pub struct Solution {
     pub outcome: Outcome,
     /// What it took.
     pub statistics: Statistics,
+    /// Norm of the projected gradient at the start.
+    pub first_norm: f64,
     /// Norm of the projected gradient at the end.
     pub gradient_norm: f64,
     /// Norm of Q x at the end.
@@ -96,10 +98,8 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let mut x = start.x;
     bounds.project(&mut x);
 
-    let d = space.dots(&[(&b, &b), (&x, &x)]);
-    let (b_norm, starts_at_zero) = (d[0].sqrt(), d[1] == 0.0);
-    let target = settings.limits.target(b_norm);
-    let loose = (LOOSE * b_norm).max(target);
+    let starts_at_zero = space.dot(&x, &x) == 0.0;
+    let (mut target, mut loose, mut first) = (0.0, 0.0, None);
     let norm = settings.norm;
     let penalty = PENALTY * norm;
     let mut balance = BALANCE * norm;
@@ -121,6 +121,9 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
         let mut done = false;
         let outcome = inner.minimise(&mut hessian, &right, &mut point, &mut statistics, &mut |now| {
             norms = now;
+            let first_norm = *first.get_or_insert(now.gradient);
+            target = settings.limits.target(first_norm);
+            loose = (LOOSE * first_norm).max(target);
             done = now.gradient <= target && norm * now.defect <= target;
             done || now.gradient <= loose.min(balance * now.defect)
         });
@@ -152,6 +155,7 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
         multiplier,
         outcome,
         statistics,
+        first_norm: first.unwrap_or(f64::NAN),
         gradient_norm: norms.gradient,
         defect_norm: norms.defect,
     }
@@ -163,7 +167,7 @@ mod tests {
     use super::super::quadratic::{Joined, Operator, Projection};
     use super::*;
 
-    const LIMITS: Limits = Limits { relative: 1e-9, reference: None, absolute: 0.0, products: 4000 };
+    const LIMITS: Limits = Limits { relative: 1e-9, reference: None, absolute: 0.0, drop: 0.0, products: 4000 };
     const NONE: f64 = f64::NEG_INFINITY;
 
     struct Case {
@@ -195,6 +199,9 @@ mod tests {
 
         fn from(&mut self, start: Start, preconditioner: Option<&mut Matrix>) -> Solution {
             let before = self.a.products;
+            let mut size = self.b.clone();
+            self.null.project(&mut size);
+            self.settings.limits.reference = Some(dot(&size, &size).sqrt());
             let problem = Problem {
                 space: &Plain,
                 function: &mut Joined {

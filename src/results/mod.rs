@@ -6,6 +6,7 @@
 //! It computes nothing: what is to be written comes in ready.
 
 pub mod agree;
+pub mod fields;
 pub mod hdf5;
 pub mod piece;
 pub mod provenance;

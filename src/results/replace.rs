@@ -41,6 +41,17 @@ pub fn replace(
     })
 }
 
+/// Whether the file could be written later: its directory exists or can be made, and takes a file. Collective.
+///
+/// # Errors
+/// [`OutputError::Write`] on every rank if not.
+pub fn probe(comm: &dyn Comm, path: &Path) -> Result<(), OutputError> {
+    let temporary = temporary_name(path);
+    let attempt = || create(&temporary, 0).and_then(|()| fs::remove_file(&temporary));
+    on_root(comm, "trying the directory", attempt)
+        .map_err(|reason| OutputError::Write { path: path.to_owned(), reason })
+}
+
 fn temporary_name(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".partial");

@@ -66,6 +66,8 @@ pub struct Summary {
     pub time: BTreeMap<String, f64>,
     /// Sum over the ranks of their largest resident memory, in MiB.
     pub peak_rss_mb: Option<f64>,
+    /// What a run would take, in MiB; from `check` only.
+    pub memory_estimate_mb: Option<f64>,
     /// Why the run failed.
     pub error: Option<String>,
     /// What the user should know.
@@ -146,10 +148,14 @@ pub struct NewtonRow {
     pub plastic_elements: u64,
     /// Contact pairs that transmit pressure.
     pub active_contacts: u64,
-    /// Outer iterations of the QP solver.
+    /// `J` after the step.
+    pub energy: f64,
+    /// Outer iterations of the QP solver: multiplier updates of SMALSE-M, sets of the active-set method.
     pub qp_iterations: u64,
     /// Applications of F.
     pub hessian_multiplications: u64,
+    /// Factorisations.
+    pub factorisations: u64,
     /// Wall time.
     pub seconds: f64,
 }

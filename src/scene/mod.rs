@@ -63,8 +63,17 @@ impl Scene {
     /// # Errors
     /// An unknown name, an unreadable file, bad TOML, an override that does not fit, or a failed check, with its place.
     pub fn load(name_or_path: &str, level: usize, sets: &[String]) -> Result<Scene, SceneError> {
+        let (text, origin) = Scene::find(name_or_path)?;
+        Scene::from_text(&text, &origin, level, sets)
+    }
+
+    /// The TOML of a built-in scene or a file, and how messages call it.
+    ///
+    /// # Errors
+    /// An unknown name or an unreadable file.
+    pub fn find(name_or_path: &str) -> Result<(String, String), SceneError> {
         if let Some(text) = library::text(name_or_path) {
-            return Scene::from_text(text, &format!("built-in scene {name_or_path}"), level, sets);
+            return Ok((text.to_owned(), format!("built-in scene {name_or_path}")));
         }
         let path = Path::new(name_or_path);
         let means_a_file = path.components().count() > 1 || path.extension().is_some() || path.exists();
@@ -74,7 +83,7 @@ impl Scene {
         }
         let text = std::fs::read_to_string(path)
             .map_err(|source| SceneError::Read { path: name_or_path.to_owned(), source })?;
-        Scene::from_text(&text, name_or_path, level, sets)
+        Ok((text, name_or_path.to_owned()))
     }
 
     /// As [`Scene::load`] for TOML that is already in memory; `origin` names it in messages.

@@ -1,0 +1,65 @@
+//! How exactly the next quadratic program is solved.
+//!
+//! Far from the solution a step need not be more exact than the model it minimises: the gradient is reduced by a factor
+//! that follows the square of the residual's last decrease (Eisenstat and Walker 1996, choice 2). The tolerance of the
+//! scene is the floor, lowered where the true residual shows that it is not enough.
+
+/// Reduction of the gradient in the first step, and the least in later ones.
+const FIRST: f64 = 0.01;
+const LOOSEST: f64 = 0.03;
+/// The most that is asked for; quadratic convergence gains nothing beyond.
+const TIGHTEST: f64 = 1e-4;
+/// Factor on the squared decrease of the residual.
+const SHARE: f64 = 0.5;
+/// What the floor is lowered by beyond the ratio of wanted to true residual.
+const MARGIN: f64 = 0.3;
+
+/// Accuracy of a quadratic program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forcing {
+    /// Reduce the first gradient of the program by this factor ...
+    pub drop: f64,
+    /// ... but not below the scene's tolerance times this.
+    pub floor: f64,
+}
+
+impl Default for Forcing {
+    fn default() -> Self {
+        Self { drop: FIRST, floor: 1.0 }
+    }
+}
+
+impl Forcing {
+    /// For the step after one that brought the true residual from `before` to `after`, where `wanted` is enough in the
+    /// end. `at_floor` says that the program was solved to the floor.
+    pub fn update(&mut self, before: f64, after: f64, wanted: f64, at_floor: bool) {
+        let ratio = after / before;
+        self.drop = (SHARE * ratio * ratio).clamp(TIGHTEST, LOOSEST);
+        if at_floor && after > wanted {
+            self.floor *= (MARGIN * wanted / after).max(TIGHTEST);
+        }
+    }
+
+    /// For another attempt at a step that did not lower the energy.
+    pub fn tighten(&mut self) {
+        self.drop *= FIRST;
+        self.floor *= FIRST;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accuracy_follows_the_residual() {
+        let mut forcing = Forcing::default();
+        forcing.update(1.0, 0.5, 1e-6, false);
+        assert_eq!(forcing, Forcing { drop: LOOSEST, floor: 1.0 });
+        forcing.update(0.5, 0.05, 1e-6, false);
+        assert!((forcing.drop - SHARE * 0.01).abs() < 1e-15);
+        forcing.update(0.05, 1e-5, 1e-6, true);
+        assert_eq!(forcing.drop, TIGHTEST);
+        assert!((forcing.floor - 0.1 * MARGIN).abs() < 1e-15);
+    }
+}
