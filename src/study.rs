@@ -23,7 +23,7 @@ use crate::material::Material;
 use crate::mesh::{Brick, Face};
 use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
-use crate::newton::{self, Settings, Solution, StepRecord, StepSettings, StepSolver, TornProblem};
+use crate::newton::{self, Method, ProgramSettings, Settings, Solution, StepRecord, StepSolver, TornProblem};
 use crate::qp::mprgp::Expansion;
 use crate::results::agree::agree;
 use crate::results::fields::{self, ContactState};
@@ -230,21 +230,19 @@ pub fn solve(
         yields: discrete.materials.iter().any(|m| m.yield_stress.is_some()),
     };
     let solver = &scene.solver;
-    let step = StepSettings {
-        tolerance: solver.qp_tolerance,
-        products: solver.qp_limit,
-        expansion: match solver.expansion {
-            scene::Expansion::ProjectedCg => Expansion::ProjectedCg,
-            scene::Expansion::Fixed => Expansion::Fixed,
-        },
+    let method = match (solver.qp, solver.expansion) {
+        (scene::Qp::ActiveSet, _) => Method::ActiveSet,
+        (scene::Qp::SmalseM, scene::Expansion::ProjectedCg) => Method::Smalse(Expansion::ProjectedCg),
+        (scene::Qp::SmalseM, scene::Expansion::Fixed) => Method::Smalse(Expansion::Fixed),
     };
+    let programs = ProgramSettings { method, tolerance: solver.qp_tolerance, products: solver.qp_limit };
     let settings = Settings {
         tolerance: solver.newton_tolerance,
         residual: solver.residual_tolerance,
         limit: solver.newton_limit,
     };
     let operator = DualOperator::new(Factors::new(symbolic), &gather);
-    let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, step, subdomains.len());
+    let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, subdomains.len());
     let solution = newton::solve(&problem, &mut steps, &settings, timer, &mut |record| {
         report(Event::NewtonStep(newton_row(record)))
     });
@@ -268,7 +266,7 @@ fn newton_row(record: &StepRecord) -> NewtonRow {
         plastic_elements: record.plastic_elements as u64,
         active_contacts: record.active_contacts as u64,
         energy: record.energy,
-        qp_iterations: record.statistics.outer as u64,
+        qp_iterations: (record.statistics.outer + record.statistics.sets) as u64,
         hessian_multiplications: record.applications as u64,
         factorisations: record.factorisations as u64,
         seconds: record.seconds,
@@ -316,9 +314,6 @@ fn summarise(
     let names = discrete.supports.iter().map(|s| s.name.clone());
     let maximum = |x: f64| space.maximum(x);
     let total = |count: fn(&StepRecord) -> usize| Some(solution.steps.iter().map(count).sum::<usize>() as u64);
-    let is_smalse = scene.solver.qp == scene::Qp::SmalseM && problem.constraints.has_inequalities;
-    let is_active_set = scene.solver.qp == scene::Qp::ActiveSet && problem.constraints.has_inequalities;
-    let outer = total(|s| s.statistics.outer);
     Summary {
         title: scene.title.clone(),
         converged: Some(solution.outcome == newton::Outcome::Converged),
@@ -327,8 +322,8 @@ fn summarise(
         newton_iterations: Some(solution.steps.len() as u64),
         qp: qp_name(scene, problem.constraints.has_inequalities).to_owned(),
         counters: Counters {
-            smalse_iterations: outer.filter(|_| is_smalse),
-            active_set_iterations: outer.filter(|_| is_active_set),
+            smalse_iterations: total(|s| s.statistics.outer),
+            active_set_iterations: total(|s| s.statistics.sets),
             dual_iterations: total(|s| s.statistics.cg + s.statistics.expansions + s.statistics.proportionings),
             hessian_multiplications: total(|s| s.applications),
             preconditioner_applications: total(|s| s.statistics.preconditioner),

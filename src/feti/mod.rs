@@ -5,6 +5,7 @@
 
 pub mod cholesky;
 pub mod coarse;
+pub mod face;
 pub mod factor;
 pub mod gather;
 pub mod interior;

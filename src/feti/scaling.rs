@@ -9,25 +9,21 @@ use std::ops::Range;
 use super::gather::Gather;
 use crate::constraint::Constraints;
 
-#[derive(Default)]
 /// `D^-1` of own subdomains and the inverses of the blocks of `B D^-1 B'`.
+#[derive(Default)]
 pub struct Scaling {
     /// Inverse diagonal of each own subdomain.
     pub flexibility: Vec<Vec<f64>>,
+    /// The three components' flexibility at the node of each slot.
+    of_slot: Vec<[f64; 3]>,
     blocks: Vec<Range<usize>>,
     /// Inverses of the blocks, row by row, one behind the other.
     inverses: Vec<f64>,
 }
 
 impl Scaling {
-    /// From the diagonals of the own subdomains' stiffness matrices; rows that are not `kept` get zero rows. One
-    /// neighbour exchange.
-    pub fn new(
-        constraints: &Constraints,
-        gather: &Gather,
-        diagonals: &[Vec<f64>],
-        kept: impl Fn(usize) -> bool,
-    ) -> Self {
+    /// From the diagonals of the own subdomains' stiffness matrices, on all rows. One neighbour exchange.
+    pub fn new(constraints: &Constraints, gather: &Gather, diagonals: &[Vec<f64>]) -> Self {
         let flexibility: Vec<Vec<f64>> = diagonals.iter().map(|d| d.iter().map(|x| 1.0 / x).collect()).collect();
         // Every slot belongs to one node of its subdomain: three numbers tell the flexibility there.
         let mut of_slot = vec![[0.0; 3]; constraints.slot_subdomain.len()];
@@ -47,10 +43,22 @@ impl Scaling {
         );
         let mut inverses = Vec::new();
         for rows in &constraints.blocks {
-            let block = block_matrix(constraints, rows.clone(), &of_slot, &kept);
-            inverses.extend(invert(block, rows.len()));
+            inverses.extend(invert(block_matrix(constraints, rows.clone(), &of_slot, |_| true), rows.len()));
         }
-        Self { flexibility, blocks: constraints.blocks.clone(), inverses }
+        Self { flexibility, of_slot, blocks: constraints.blocks.clone(), inverses }
+    }
+
+    /// From now on only the kept rows count, the others get zero. Only rows of inequalities may come and go. Local.
+    pub fn restrict(&mut self, constraints: &Constraints, kept: impl Fn(usize) -> bool) {
+        let mut at = 0;
+        for rows in &self.blocks {
+            let end = at + rows.len() * rows.len();
+            if constraints.rows[rows.clone()].iter().any(|row| row.is_inequality()) {
+                let block = block_matrix(constraints, rows.clone(), &self.of_slot, &kept);
+                self.inverses[at..end].copy_from_slice(&invert(block, rows.len()));
+            }
+            at = end;
+        }
     }
 
     /// `y = (B D^-1 B')^-1 x`. Local.
@@ -66,12 +74,12 @@ impl Scaling {
     }
 }
 
-/// `B D^-1 B'` of one block; a row that is not kept has a unit diagonal and nothing else, marked by NaN for [`invert`].
+/// `B D^-1 B'` of one block, zero in the rows that are not kept.
 fn block_matrix(
     constraints: &Constraints,
     rows: Range<usize>,
     of_slot: &[[f64; 3]],
-    kept: &impl Fn(usize) -> bool,
+    kept: impl Fn(usize) -> bool,
 ) -> Vec<f64> {
     let n = rows.len();
     let mut terms = Vec::new();

@@ -1,10 +1,15 @@
-//! The dual problem in the words of the QP solvers: inner products, and `F`, `P`, `M` as one quadratic function.
+//! The dual problem in the words of the QP solvers: inner products, and `F`, `P`, `M` as one quadratic function, on all
+//! rows or on those of an active set.
 
+use crate::constraint::Constraints;
+use crate::feti::coarse::Coarse;
+use crate::feti::face::CoarseFace;
 use crate::feti::operator::DualOperator;
 use crate::feti::preconditioner::Preconditioner;
 use crate::feti::projector::Projector;
 use crate::feti::space::RowSpace;
 use crate::monitor::timing::Timer;
+use crate::qp::active_set::Face;
 use crate::qp::quadratic::{Operator, Projection, Quadratic, Space};
 
 /// Inner products of multipliers.
@@ -34,6 +39,20 @@ pub struct Dual<'s, 'a> {
     pub timer: &'s Timer,
 }
 
+impl<'a> Dual<'_, 'a> {
+    /// The same for a shorter while.
+    pub fn reborrow(&mut self) -> Dual<'_, 'a> {
+        Dual { operator: self.operator, preconditioner: self.preconditioner.as_deref_mut(), ..*self }
+    }
+
+    /// From now on the preconditioner scales the kept rows only.
+    pub fn restrict_scaling(&mut self, constraints: &Constraints, kept: &[bool]) {
+        if let Some(preconditioner) = &mut self.preconditioner {
+            self.timer.time("scaling", || preconditioner.scaling.restrict(constraints, |row| kept[row]));
+        }
+    }
+}
+
 impl Operator for Dual<'_, '_> {
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.timer.time("dual operator", || self.operator.apply(x, y));
@@ -53,5 +72,69 @@ impl Quadratic for Dual<'_, '_> {
         let stiffness = |own: usize| (&factors.symbolic(own).pattern, &self.tangents[own][..]);
         self.timer.time("preconditioner", || preconditioner.apply(stiffness, r, z));
         true
+    }
+}
+
+/// The dual problem on the rows of an active set: multipliers elsewhere are zero.
+pub struct DualFace<'s, 'a> {
+    /// On all rows.
+    pub dual: Dual<'s, 'a>,
+    /// The rows of B.
+    pub constraints: &'s Constraints,
+    /// `e`, whole on every rank.
+    pub balance: &'s [f64],
+    /// The rows of the set.
+    pub rows: CoarseFace,
+}
+
+impl DualFace<'_, '_> {
+    fn coarse(&self) -> &Coarse<'_> {
+        &self.dual.projector.coarse
+    }
+}
+
+impl Operator for DualFace<'_, '_> {
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.dual.apply(x, y);
+    }
+}
+
+impl Projection for DualFace<'_, '_> {
+    fn project(&mut self, x: &mut [f64]) {
+        self.dual.timer.time("coarse problem", || self.rows.project(self.coarse(), x));
+    }
+}
+
+impl Quadratic for DualFace<'_, '_> {
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
+        self.dual.precondition(r, z)
+    }
+}
+
+impl Face for DualFace<'_, '_> {
+    fn restrict(&mut self, kept: &[bool]) -> bool {
+        let timer = self.dual.timer;
+        match timer.time("coarse set-up", || CoarseFace::new(self.coarse(), kept.to_vec())) {
+            Ok(rows) => self.rows = rows,
+            Err(_) => return false,
+        }
+        self.dual.restrict_scaling(self.constraints, kept);
+        true
+    }
+
+    fn restore(&mut self, x: &mut [f64]) {
+        self.dual.timer.time("coarse problem", || {
+            self.rows.mask(x);
+            let balance = self.coarse().apply(x);
+            let missing = self.balance.iter().zip(balance).map(|(e, b)| e - b).collect();
+            self.rows.add_balance(self.coarse(), missing, x);
+        });
+    }
+
+    fn gaps(&mut self, residual: &mut [f64]) {
+        self.dual.timer.time("coarse problem", || {
+            let a = self.rows.amplitudes(self.coarse(), residual);
+            self.coarse().add_transpose(-1.0, &a, residual);
+        });
     }
 }

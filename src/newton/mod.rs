@@ -7,13 +7,15 @@ pub mod damping;
 pub mod dual;
 pub mod forcing;
 pub mod problem;
+pub mod program;
 pub mod recover;
 pub mod residuals;
 pub mod step;
 
 pub use problem::TornProblem;
+pub use program::{Method, ProgramSettings};
 pub use residuals::Residuals;
-pub use step::{StepSettings, StepSolver};
+pub use step::StepSolver;
 
 use crate::feti::Torn;
 use crate::monitor::timing::Timer;
@@ -209,3 +211,6 @@ pub fn solve(
         plastic_elements: state.plastic,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,45 +1,19 @@
-//! `du = K^+ (f_k - B'lambda) + R a` (paper, section 4).
+//! Rigid motions of the torn problem: `e = R'f_k` and the `R a` of `du = K^+ (f_k - B'lambda) + R a` (paper, section 4).
 //!
-//! The amplitudes satisfy the equalities and the active contacts in the least-squares sense,
+//! The amplitudes satisfy the equalities and the closed contacts in the least-squares sense,
 //! `a = (G G')^-1 G (c - B K^+ (f_k - B'lambda))` with `G` restricted to those rows; at the solution exactly.
 
 use super::problem::TornProblem;
 use crate::feti::Torn;
-use crate::feti::coarse::{Coarse, CoarseFactor, Floating, MODES};
+use crate::feti::coarse::{Coarse, MODES};
 
-/// The coarse problem of the equalities and some contacts.
-pub struct CoarseFace {
-    kept: Vec<bool>,
-    factor: CoarseFactor,
-}
-
-impl CoarseFace {
-    /// Of the rows that are kept. Collective.
-    ///
-    /// # Errors
-    /// If these rows leave a rigid motion free.
-    pub fn new(coarse: &Coarse, kept: Vec<bool>) -> Result<Self, Floating> {
-        let factor = coarse.restricted(|row| kept[row])?;
-        Ok(Self { kept, factor })
+/// `R'f`, whole on every rank. One all-gather.
+pub fn resultants(problem: &TornProblem, coarse: &Coarse, forces: &Torn) -> Vec<f64> {
+    let mut mine = Vec::new();
+    for ((subdomain, modes), f) in problem.subdomains.iter().zip(problem.modes).zip(forces) {
+        mine.extend(modes.resultants(&subdomain.points, f));
     }
-
-    /// The amplitudes `a` that make `rows - G'a` smallest on the kept rows. One all-gather.
-    pub fn amplitudes(&self, coarse: &Coarse, rows: &[f64]) -> Vec<f64> {
-        let masked: Vec<f64> = rows.iter().zip(&self.kept).map(|(r, &k)| if k { *r } else { 0.0 }).collect();
-        let mut a = coarse.apply(&masked);
-        self.factor.solve(&mut a);
-        a
-    }
-
-    /// Adds to the kept rows the least that changes `G rows` by `e`. Local.
-    pub fn add_balance(&self, coarse: &Coarse, mut e: Vec<f64>, rows: &mut [f64]) {
-        self.factor.solve(&mut e);
-        let mut change = vec![0.0; rows.len()];
-        coarse.add_transpose(1.0, &e, &mut change);
-        for ((r, c), _) in rows.iter_mut().zip(change).zip(&self.kept).filter(|(_, kept)| **kept) {
-            *r += c;
-        }
-    }
+    coarse.share(&mine)
 }
 
 /// Adds `R a` to a torn displacement.

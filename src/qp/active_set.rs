@@ -45,38 +45,41 @@ pub struct Solution {
     pub kept: Vec<bool>,
     /// How it ended.
     pub outcome: Outcome,
-    /// What it took; `outer` counts sets.
+    /// What it took.
     pub statistics: Statistics,
-    /// Norm of the projected residual at the end.
-    pub norm: f64,
+    /// Norm of the projected residual at the start, on the first set.
+    pub first_norm: f64,
 }
 
-/// Solves from `x` and the set `kept` (true for all rows without a bound). The reference of `limits` is by default the
-/// first residual, which at a warm start is too small: give one there.
-pub fn solve(
-    space: &dyn Space,
-    face: &mut dyn Face,
-    d: &[f64],
-    bounded: &[bool],
-    start: (Vec<f64>, Vec<bool>),
-    limits: &Limits,
-) -> Solution {
-    let (x, kept) = start;
-    let n = d.len();
+/// Where to start.
+pub struct Start {
+    /// The unknowns.
+    pub x: Vec<f64>,
+    /// `d - A x`.
+    pub residual: Vec<f64>,
+    /// The first set, to which the face is restricted already; true for all rows without a bound.
+    pub kept: Vec<bool>,
+}
+
+/// Solves the problem. The reference of `limits` is by default the first residual, which at a warm start is too small:
+/// give one there.
+pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Start, limits: &Limits) -> Solution {
+    let Start { x, residual, kept } = start;
+    let n = x.len();
     let mut run = Run {
         space,
         bounded,
-        x: vec![0.0; n],
-        residual: d.to_vec(),
+        x: x.clone(),
+        residual,
         kept,
         work: vec![0.0; n],
         image: vec![0.0; n],
         statistics: Statistics::default(),
-        norm: f64::NAN,
+        first_norm: f64::NAN,
     };
     let outcome = run.iterate(face, x, limits);
-    let Run { x, residual, kept, statistics, norm, .. } = run;
-    Solution { x, residual, kept, outcome, statistics, norm }
+    let Run { x, residual, kept, statistics, first_norm, .. } = run;
+    Solution { x, residual, kept, outcome, statistics, first_norm }
 }
 
 struct Run<'a> {
@@ -88,7 +91,7 @@ struct Run<'a> {
     work: Vec<f64>,
     image: Vec<f64>,
     statistics: Statistics,
-    norm: f64,
+    first_norm: f64,
 }
 
 impl Run<'_> {
@@ -100,20 +103,19 @@ impl Run<'_> {
         let (mut history, mut strict) = (Vec::new(), false);
         while history.len() < SETS {
             history.push(self.kept.clone());
-            if !face.restrict(&self.kept) {
-                return Outcome::Cycled;
-            }
             solver.forget();
             self.move_to(face, &mut wish);
-            self.statistics.outer += 1;
-            let target = *target.get_or_insert_with(|| limits.target(self.projected_norm(face)));
+            self.statistics.sets += 1;
+            if target.is_none() {
+                self.first_norm = self.projected_norm(face);
+            }
+            let target = *target.get_or_insert(limits.target(self.first_norm));
             loop {
                 let products = limits.products.saturating_sub(self.statistics.hessian);
                 let relative = if strict { 0.0 } else { LOOSE };
                 let loose = Limits { relative, reference: None, absolute: target, drop: 0.0, products };
                 let report = solver.solve(face, &mut self.x, &mut self.residual, &loose);
                 self.statistics += report.statistics;
-                self.norm = report.norm;
                 if report.outcome != Outcome::Converged {
                     return report.outcome;
                 }
@@ -130,6 +132,9 @@ impl Run<'_> {
                 }
                 strict = true;
                 history.clear();
+            }
+            if !face.restrict(&self.kept) {
+                return Outcome::Cycled;
             }
             wish.copy_from_slice(&self.x);
         }
@@ -191,8 +196,10 @@ mod tests {
     const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
 
     fn from(torn: &mut Torn, x: Vec<f64>, kept: Vec<bool>, limits: &Limits) -> Solution {
-        let (d, bounded) = (torn.d.clone(), torn.bounded.clone());
-        solve(&Plain, torn, &d, &bounded, (x, kept), limits)
+        let bounded = torn.bounded.clone();
+        assert!(torn.restrict(&kept));
+        let residual = torn.f.times(&x).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();
+        solve(&Plain, torn, &bounded, Start { x, residual, kept }, limits)
     }
 
     #[test]
@@ -250,7 +257,7 @@ mod tests {
         let n = torn.d.len();
         let limits = Limits { products: 5, ..LIMITS };
         assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &limits).outcome, Outcome::LimitReached);
-        assert_eq!(from(&mut torn, vec![0.0; n], vec![false; n], &LIMITS).outcome, Outcome::Cycled);
+        assert!(!torn.restrict(&vec![false; n]));
         torn.f.entries[3] = f64::NAN;
         assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS).outcome, Outcome::NotFinite);
     }

@@ -43,8 +43,10 @@ pub enum Outcome {
 /// What a solver did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// Updates of the equality multiplier (SMALSE-M) or of the set (active set).
+    /// Updates of the equality multiplier (SMALSE-M).
     pub outer: usize,
+    /// Equality problems solved for guessed active sets.
+    pub sets: usize,
     /// Conjugate gradient steps.
     pub cg: usize,
     /// Steps that ran into bounds.
@@ -60,6 +62,7 @@ pub struct Statistics {
 impl std::ops::AddAssign for Statistics {
     fn add_assign(&mut self, other: Self) {
         self.outer += other.outer;
+        self.sets += other.sets;
         self.cg += other.cg;
         self.expansions += other.expansions;
         self.proportionings += other.proportionings;

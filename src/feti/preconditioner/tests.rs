@@ -39,7 +39,8 @@ impl<'a> Case<'a> {
         let mut preconditioner = Preconditioner::new(&setup.gather, interior);
         let diagonals: Vec<Vec<f64>> =
             stiffnesses.iter().enumerate().map(|(k, values)| factors.symbolic(k).pattern.diagonal(values)).collect();
-        preconditioner.scaling = Scaling::new(&setup.discrete.constraints, &setup.gather, &diagonals, kept);
+        preconditioner.scaling = Scaling::new(&setup.discrete.constraints, &setup.gather, &diagonals);
+        preconditioner.scaling.restrict(&setup.discrete.constraints, kept);
         Self { preconditioner, factors, stiffnesses }
     }
 

@@ -1,0 +1,240 @@
+//! The quadratic program of a Newton step, from the last step's multipliers to its own.
+//!
+//! The dual is `min 1/2 l'F l - l'd` over `l_I >= 0`, `G l = e` with `e = R'f_k`, `d = B K^+ f_k - c_k` (paper, section 4).
+//! It starts from the last step's multipliers `l0`, corrected so that `G l0 = e`; the residual
+//! `d - F l0 = B K^+ (f_k - B'l0) - c_k` costs one application of F. Without inequalities PCPG solves it. With them the
+//! active set does, and where its sets come back SMALSE-M, on the homogeneous problem of `l - l0`.
+
+use super::dual::{Dual, DualFace, Multipliers};
+use super::forcing::Forcing;
+use super::problem::TornProblem;
+use crate::feti::coarse::{Coarse, Floating};
+use crate::feti::face::CoarseFace;
+use crate::qp::bounds::Bounds;
+use crate::qp::mprgp::Expansion;
+use crate::qp::pcpg::Pcpg;
+use crate::qp::quadratic::{Projection, Space};
+use crate::qp::{Limits, Outcome, Statistics, active_set, power, smalse};
+
+/// Which solver takes a program with inequalities.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Active sets, and SMALSE-M where they cycle.
+    ActiveSet,
+    /// SMALSE-M.
+    Smalse(Expansion),
+}
+
+/// How to solve the programs.
+#[derive(Clone, Copy, Debug)]
+pub struct ProgramSettings {
+    /// Which solver.
+    pub method: Method,
+    /// Tolerance relative to the first step's residual, which measures the whole displacement.
+    pub tolerance: f64,
+    /// Products with the Hessian that one program may take.
+    pub products: usize,
+}
+
+/// Where a program starts.
+pub struct Warm {
+    /// `e`, whole on every rank.
+    pub balance: Vec<f64>,
+    /// Multipliers with `G l = e`.
+    pub lambda: Vec<f64>,
+}
+
+/// Its solution.
+pub struct Found {
+    /// Multipliers, not negative where bounded.
+    pub lambda: Vec<f64>,
+    /// The same to the tolerance of the program, with `G l = e` to round-off.
+    pub balanced: Vec<f64>,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// What it took.
+    pub statistics: Statistics,
+    /// Whether it was solved to the tolerance of the scene.
+    pub at_floor: bool,
+}
+
+/// The solvers with what is kept from step to step.
+pub struct Programs {
+    settings: ProgramSettings,
+    /// Multipliers of the last step, and the coarse problem of the rows that they act on.
+    last: Option<(Vec<f64>, CoarseFace)>,
+    reference: Option<f64>,
+    norm: Option<f64>,
+}
+
+impl Programs {
+    /// Nothing is known yet.
+    pub fn new(settings: ProgramSettings) -> Self {
+        Self { settings, last: None, reference: None, norm: None }
+    }
+
+    /// Multipliers with `G l = e` next to the last ones: the smallest such if there are none.
+    pub fn start(&self, coarse: &Coarse, rows: usize, balance: Vec<f64>) -> Warm {
+        let mut lambda = self.last.as_ref().map_or_else(|| vec![0.0; rows], |(last, _)| last.clone());
+        let mut missing: Vec<f64> = balance.iter().zip(coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
+        match &self.last {
+            // Open contacts stay open.
+            Some((_, face)) => face.add_balance(coarse, missing, &mut lambda),
+            None => {
+                coarse.solve(&mut missing);
+                coarse.add_transpose(1.0, &missing, &mut lambda);
+            }
+        }
+        Warm { balance, lambda }
+    }
+
+    /// Solves a program with the residual `b` at its start. The rows that hold the bodies afterwards are in
+    /// [`Programs::held`]. Collective.
+    ///
+    /// # Errors
+    /// If these rows leave a rigid motion free.
+    pub fn solve(
+        &mut self,
+        problem: &TornProblem,
+        mut dual: Dual,
+        warm: Warm,
+        b: Vec<f64>,
+        forcing: Forcing,
+    ) -> Result<Found, Floating> {
+        let limits = Limits {
+            relative: self.settings.tolerance * forcing.floor,
+            reference: self.reference,
+            absolute: 0.0,
+            drop: if problem.is_linear() { 0.0 } else { forcing.drop },
+            products: self.settings.products,
+        };
+        if !problem.constraints.has_inequalities {
+            return self.equalities(problem, dual, warm.lambda, b, limits);
+        }
+        let mut wasted = Statistics::default();
+        if self.settings.method == Method::ActiveSet {
+            let found = self.active_set(problem, &mut dual, &warm, b.clone(), limits)?;
+            if found.outcome != Outcome::Cycled {
+                return Ok(found);
+            }
+            wasted = found.statistics;
+            dual.restrict_scaling(problem.constraints, &vec![true; b.len()]);
+        }
+        let mut found = self.smalse(problem, dual, warm.lambda, b, limits)?;
+        found.statistics += wasted;
+        Ok(found)
+    }
+
+    /// The rows that the last program's multipliers act on.
+    pub fn held(&self) -> Option<&CoarseFace> {
+        self.last.as_ref().map(|(_, face)| face)
+    }
+
+    fn equalities(
+        &mut self,
+        problem: &TornProblem,
+        mut dual: Dual,
+        mut lambda: Vec<f64>,
+        mut residual: Vec<f64>,
+        limits: Limits,
+    ) -> Result<Found, Floating> {
+        let space = Multipliers(problem.space, dual.timer);
+        let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
+        let at_floor = self.note(&limits, report.first_norm);
+        if self.last.is_none() {
+            let all = CoarseFace::new(&dual.projector.coarse, vec![true; lambda.len()])?;
+            self.last = Some((Vec::new(), all));
+        }
+        self.last.iter_mut().for_each(|(last, _)| last.clone_from(&lambda));
+        let (outcome, statistics) = (report.outcome, report.statistics);
+        Ok(Found { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
+    }
+
+    fn active_set(
+        &mut self,
+        problem: &TornProblem,
+        dual: &mut Dual,
+        warm: &Warm,
+        residual: Vec<f64>,
+        limits: Limits,
+    ) -> Result<Found, Floating> {
+        let space = Multipliers(problem.space, dual.timer);
+        let bounded: Vec<bool> = problem.constraints.rows.iter().map(|row| row.is_inequality()).collect();
+        let coarse = &dual.projector.coarse;
+        let rows = match self.last.take() {
+            Some((_, face)) => face,
+            None => CoarseFace::new(coarse, vec![true; bounded.len()])?,
+        };
+        let start = active_set::Start { x: warm.lambda.clone(), residual, kept: rows.kept().to_vec() };
+        dual.restrict_scaling(problem.constraints, rows.kept());
+        let mut face =
+            DualFace { dual: dual.reborrow(), constraints: problem.constraints, balance: &warm.balance, rows };
+        let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
+        let at_floor = self.note(&limits, solution.first_norm);
+        let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;
+        let mut lambda = balanced.clone();
+        lambda.iter_mut().zip(&bounded).filter(|(_, bounded)| **bounded).for_each(|(l, _)| *l = l.max(0.0));
+        self.last = Some((lambda.clone(), face.rows));
+        Ok(Found { lambda, balanced, outcome, statistics, at_floor })
+    }
+
+    fn smalse(
+        &mut self,
+        problem: &TornProblem,
+        mut dual: Dual,
+        start: Vec<f64>,
+        b: Vec<f64>,
+        limits: Limits,
+    ) -> Result<Found, Floating> {
+        let (timer, projector) = (dual.timer, dual.projector);
+        let space = Multipliers(problem.space, timer);
+        let mut projected = b.clone();
+        let mean = timer.time("coarse problem", || projector.project(&mut projected));
+        let mut statistics = Statistics::default();
+        let (mut x, mut outcome, mut at_floor) = (vec![0.0; b.len()], Outcome::Converged, true);
+        if space.norm(&projected) != 0.0 {
+            if self.norm.is_none() {
+                let estimate = power::norm(&space, &mut dual, &projected);
+                statistics.hessian += estimate.as_ref().map_or(0, |e| e.products);
+                self.norm = estimate.map(|e| e.norm);
+            }
+            // Open contacts are part of b, but not of the rigid motion: the last step's set tells them apart.
+            let multiplier = self.last.as_ref().map(|(_, face)| {
+                let mut a = face.amplitudes(&projector.coarse, &b);
+                a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
+                let mut multiplier = vec![0.0; b.len()];
+                projector.coarse.add_transpose(1.0, &a, &mut multiplier);
+                multiplier
+            });
+            let contacts = problem.constraints.rows.iter().zip(&start);
+            let lower = contacts.map(|(row, l)| if row.is_inequality() { -l } else { f64::NEG_INFINITY }).collect();
+            let expansion = match self.settings.method {
+                Method::Smalse(expansion) => expansion,
+                Method::ActiveSet => Expansion::ProjectedCg,
+            };
+            // A norm that is not finite ends as such an outcome.
+            let norm = self.norm.unwrap_or(f64::NAN);
+            let solution = smalse::solve(
+                smalse::Problem { space: &space, function: &mut dual, b: &projected, bounds: &Bounds::new(lower) },
+                &smalse::Settings { limits, norm, expansion },
+                smalse::Start { x, multiplier },
+            );
+            at_floor = self.note(&limits, solution.first_norm);
+            statistics += solution.statistics;
+            (x, outcome) = (solution.x, solution.outcome);
+        }
+        let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
+        dual.project(&mut x);
+        let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
+        let held = problem.constraints.rows.iter().zip(&lambda).map(|(row, &l)| !row.is_inequality() || l > 0.0);
+        let face = timer.time("coarse set-up", || CoarseFace::new(&projector.coarse, held.collect()))?;
+        self.last = Some((lambda.clone(), face));
+        Ok(Found { lambda, balanced, outcome, statistics, at_floor })
+    }
+
+    /// Keeps the first residual as the reference of all tolerances; says whether that of the scene was aimed at.
+    fn note(&mut self, limits: &Limits, first: f64) -> bool {
+        let reference = *self.reference.get_or_insert(first);
+        limits.relative * reference >= limits.drop * first
+    }
+}

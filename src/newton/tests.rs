@@ -1,0 +1,102 @@
+use crate::comm::threads;
+use crate::fixture::two_bricks;
+use crate::monitor::timing::Timer;
+use crate::results::piece::{Field, Values};
+use crate::results::summary::Summary;
+use crate::scene::Scene;
+use crate::study;
+
+const METHODS: [[&str; 2]; 5] = [
+    ["solver.qp=\"smalse-m\"", "solver.preconditioner=\"none\""],
+    ["solver.qp=\"smalse-m\"", "solver.preconditioner=\"dirichlet\""],
+    ["solver.qp=\"active-set\"", "solver.preconditioner=\"none\""],
+    ["solver.qp=\"active-set\"", "solver.preconditioner=\"lumped\""],
+    ["solver.qp=\"active-set\"", "solver.preconditioner=\"dirichlet\""],
+];
+
+/// Loaded until much of the lower brick yields.
+fn plastic(sets: &[&str]) -> Scene {
+    let common = ["load.top.traction=[0.0, 0.0, -0.35]", "support.right.displacement=[0.0, 0.0, 0.0]"];
+    two_bricks(&[&common, sets].concat())
+}
+
+/// What is known after the solve, and the displacements of all ranks.
+fn solve(scene: &Scene, ranks: usize) -> (Summary, Vec<u64>) {
+    let parts = threads::run(ranks, |comm| {
+        let discrete = study::discretise(scene, comm).expect("the scene has a discrete problem");
+        let solved = study::solve(scene, &discrete, comm, &Timer::start(), &mut |_| ()).expect("the bodies are held");
+        let field = solved.piece.point_data.into_iter().find(|field| field.name == "displacement");
+        let Some(Field { values: Values::Real(u), .. }) = field else { panic!("displacements are real") };
+        (solved.summary, u)
+    });
+    let displacements = parts.iter().flat_map(|(_, u)| u).map(|u| u.to_bits()).collect();
+    (parts.into_iter().next().expect("rank 0").0, displacements)
+}
+
+fn energies(summary: &Summary) -> Vec<f64> {
+    summary.newton.iter().map(|row| row.energy).collect()
+}
+
+#[test]
+fn all_methods_give_one_solution() {
+    let exact = |method: &[&str]| {
+        plastic(&[method, &["solver.qp_tolerance=1e-11", "solver.residual_tolerance=1e-10"]].concat())
+    };
+    let found = METHODS.map(|method| solve(&exact(&method), 2).0);
+    for (summary, method) in found.iter().zip(METHODS) {
+        assert_eq!(summary.converged, Some(true), "{method:?}: {:?}", summary.error);
+        let (own, first) = (summary.energy.unwrap(), found[0].energy.unwrap());
+        assert!((own / first - 1.0).abs() < 1e-10, "{method:?}: {own} {first}");
+        assert_eq!(summary.plastic_elements, found[0].plastic_elements);
+        assert_eq!(summary.active_contacts, found[0].active_contacts);
+    }
+    assert!(found[0].plastic_elements > Some(10) && found[0].active_contacts > Some(1));
+    assert!(found[0].active_contacts < Some(found[0].sizes.contact_rows), "part of the contact is open");
+}
+
+#[test]
+fn ranks_change_no_bit() {
+    for method in METHODS {
+        let scene = plastic(&method);
+        let (alone, displacements) = solve(&scene, 1);
+        for ranks in [2, 3, 5] {
+            let (summary, others) = solve(&scene, ranks);
+            assert_eq!(others, displacements, "{method:?} on {ranks} ranks");
+            assert_eq!((summary.counters.clone(), energies(&summary)), (alone.counters.clone(), energies(&alone)));
+        }
+    }
+}
+
+#[test]
+fn the_energy_falls_in_every_step_and_the_end_is_quadratic() {
+    let scene = plastic(&[&METHODS[4][..], &["solver.qp_tolerance=1e-13", "solver.residual_tolerance=1e-11"]].concat());
+    let (summary, _) = solve(&scene, 1);
+    assert_eq!(summary.converged, Some(true), "{:?}", summary.error);
+    assert!(summary.newton.len() >= 4);
+    let energies = energies(&summary);
+    let noise = 1e-13 * energies[0].abs();
+    assert!(energies.windows(2).all(|e| e[1] <= e[0] + noise), "{energies:?}");
+    // Once the plastic elements are found, the residual falls at least with the power that the inner accuracy allows.
+    let [.., before, last] = &summary.newton[..] else { panic!() };
+    assert!(last.residual < 1e-3 * before.residual || last.residual < 1e-13, "{:?}", summary.newton);
+}
+
+#[test]
+fn too_few_steps_or_products_end_as_outcomes() {
+    for (limit, word) in [("solver.newton_limit=2", "newton_limit"), ("solver.qp_limit=3", "qp_limit")] {
+        for method in METHODS {
+            let (summary, _) = solve(&plastic(&[&method[..], &[limit]].concat()), 2);
+            assert_eq!(summary.converged, Some(false), "{method:?}");
+            assert!(summary.error.as_ref().is_some_and(|e| e.contains(word)), "{:?}", summary.error);
+        }
+    }
+}
+
+#[test]
+fn numbers_without_end_are_an_outcome() {
+    for method in METHODS {
+        let (summary, _) = solve(&plastic(&[&method[..], &["load.top.traction=[0.0, 0.0, -1e300]"]].concat()), 2);
+        assert_eq!(summary.converged, Some(false));
+        assert!(summary.error.as_ref().is_some_and(|e| e.contains("not finite")), "{:?}", summary.error);
+    }
+}
