@@ -8,6 +8,7 @@ use crate::comm::{Comm, threads};
 use crate::constraint::Row;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
+use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::gather::Gather;
@@ -115,7 +116,7 @@ impl<'a> Setup<'a> {
 
     /// Factors of the elastic stiffness matrices, and these.
     pub fn factors(&self) -> (Factors, Vec<Vec<f64>>) {
-        let mut factors = Factors::new(analyse(self.subdomains()));
+        let mut factors = Factors::new(analyse(self.subdomains()), Precision::Double);
         let mut stiffnesses = Vec::new();
         for (own, subdomain) in self.subdomains().iter().enumerate() {
             let values = elastic(subdomain, self.material(own), &factors.symbolic(own).pattern);

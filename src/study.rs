@@ -10,6 +10,7 @@ use crate::constraint::{ConstraintError, Constraints, Kind, Support};
 use crate::contact::surface::GatheredSurface;
 use crate::contact::{ContactError, ContactPair, matching};
 use crate::decomposition::{self, BodyMesh, Cut, Decomposition, Surface};
+use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::gather::Gather;
@@ -204,9 +205,13 @@ pub fn solve(
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
     let coarse = timer.time("coarse set-up", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
+    let precision = match scene.solver.precision {
+        scene::Precision::Mixed => Precision::Single,
+        scene::Precision::Double => Precision::Double,
+    };
     let interior = || {
         let boundaries = preconditioner::boundaries(&gather, subdomains.len());
-        InteriorFactors::new(interior::analyse(&symbolic, boundaries))
+        InteriorFactors::new(interior::analyse(&symbolic, boundaries), precision)
     };
     let preconditioner = match scene.solver.preconditioner {
         scene::Preconditioner::None => None,
@@ -241,7 +246,7 @@ pub fn solve(
         residual: solver.residual_tolerance,
         limit: solver.newton_limit,
     };
-    let operator = DualOperator::new(Factors::new(symbolic), &gather);
+    let operator = DualOperator::new(Factors::new(symbolic, precision), &gather);
     let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, subdomains.len());
     let solution = newton::solve(&problem, &mut steps, &settings, timer, &mut |record| {
         report(Event::NewtonStep(newton_row(record)))

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use thiserror::Error;
 
-use super::cholesky::{Analysis, Lower, Workspace};
+use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use super::gather::Gather;
 use super::kernel::RigidModes;
 use crate::comm::{Comm, Shares, all_gather_u64};
@@ -190,7 +190,7 @@ fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
 /// Sparse Cholesky factor of `G G'`, whole on every rank.
 pub struct CoarseFactor {
     cholesky: Analysis,
-    values: Vec<f64>,
+    factor: Factor,
     workspace: RefCell<Workspace>,
 }
 
@@ -216,11 +216,11 @@ impl CoarseFactor {
         let lower = Lower { column_begin: &begins, rows: &rows };
         let cholesky = Analysis::minimum_degree(lower);
         let mut workspace = Workspace::new([&cholesky]);
-        let mut factor = vec![0.0; cholesky.factor_length()];
+        let mut factor = Factor::new(&cholesky, Precision::Double);
         workspace
             .factorise(&cholesky, lower, &values, &mut factor)
             .map_err(|breakdown| Floating { subdomain: breakdown.unknown / MODES })?;
-        let result = Self { cholesky, values: factor, workspace: RefCell::new(workspace) };
+        let result = Self { cholesky, factor, workspace: RefCell::new(workspace) };
         // Round-off can hide a free motion: the factor then answers far beyond the size of the matrix.
         let largest = values.iter().copied().fold(0.0, f64::max);
         result.check_rank(n, largest).map(|()| result)
@@ -240,7 +240,7 @@ impl CoarseFactor {
 
     /// `a = (G G')^-1 a`, six numbers a subdomain. Local.
     pub fn solve(&self, a: &mut [f64]) {
-        self.workspace.borrow_mut().solve(&self.cholesky, &self.values, a);
+        self.workspace.borrow_mut().solve(&self.cholesky, &self.factor, a);
     }
 }
 

@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use thiserror::Error;
 
-use super::cholesky::{Analysis, Lower, Workspace};
+use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use super::kernel::RigidModes;
 use super::ordering::nested_dissection;
 use crate::assembly::pattern::Pattern;
@@ -16,6 +16,8 @@ use crate::decomposition::Subdomain;
 
 /// Number of fixing nodes: as many as a box has corners.
 const FIXING_NODES: usize = 8;
+/// Error that a factor in single precision may make.
+const PROBE: f64 = 1e-3;
 
 /// The stiffness matrix lost its definiteness (up to rigid motions).
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -58,7 +60,7 @@ impl Symbolic {
         subdomain.elements == of.elements && fixing_nodes(&subdomain.points) == self.fixing
     }
 
-    /// Doubles in the factor.
+    /// Numbers in the factor.
     pub fn factor_length(&self) -> usize {
         self.cholesky.factor_length()
     }
@@ -88,22 +90,33 @@ pub fn analyse(subdomains: &[Subdomain]) -> Vec<Rc<Symbolic>> {
 /// Numeric factors of all own subdomains.
 pub struct Factors {
     symbolic: Vec<Rc<Symbolic>>,
-    values: Vec<Vec<f64>>,
+    factors: Vec<Factor>,
+    precision: Precision,
     workspace: Workspace,
     shifted: Vec<f64>,
 }
 
 impl Factors {
-    /// Space for the factors; nothing is factorised yet.
-    pub fn new(symbolic: Vec<Rc<Symbolic>>) -> Self {
+    /// Space for the factors; nothing is factorised yet. Of single precision are those that pass a probe.
+    pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
-        let values = symbolic.iter().map(|s| vec![0.0; s.factor_length()]).collect();
-        Self { symbolic, values, workspace, shifted: Vec::new() }
+        let factors = symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)).collect();
+        Self { symbolic, factors, precision, workspace, shifted: Vec::new() }
     }
 
     /// Symbolic analysis of an own subdomain.
     pub fn symbolic(&self, own: usize) -> &Symbolic {
         &self.symbolic[own]
+    }
+
+    /// What new factors are stored in at least.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    /// From now on factorises in this precision.
+    pub fn set_precision(&mut self, precision: Precision) {
+        self.precision = precision;
     }
 
     /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`.
@@ -122,15 +135,36 @@ impl Factors {
         if !rho.is_finite() {
             return Err(refuse(0));
         }
-        self.workspace
-            .factorise(cholesky, lower(pattern), &self.shifted, &mut self.values[own])
-            .map_err(|breakdown| refuse(breakdown.place))
+        let factor = &mut self.factors[own];
+        if factor.precision() != self.precision {
+            *factor = Factor::new(cholesky, self.precision);
+        }
+        let outcome = self.workspace.factorise(cholesky, lower(pattern), &self.shifted, factor);
+        if factor.precision() == Precision::Double {
+            return outcome.map_err(|breakdown| refuse(breakdown.place));
+        }
+        if outcome.is_err() || !passes_probe(pattern, &self.shifted, |x| self.workspace.solve(cholesky, factor, x)) {
+            *factor = Factor::new(cholesky, Precision::Double);
+            let outcome = self.workspace.factorise(cholesky, lower(pattern), &self.shifted, factor);
+            return outcome.map_err(|breakdown| refuse(breakdown.place));
+        }
+        Ok(())
     }
 
     /// `x = K^+ x` for one own subdomain.
     pub fn solve(&mut self, own: usize, x: &mut [f64]) {
-        self.workspace.solve(&self.symbolic[own].cholesky, &self.values[own], x);
+        self.workspace.solve(&self.symbolic[own].cholesky, &self.factors[own], x);
     }
+}
+
+/// Whether a factor of `A` gives back a vector without a pattern: an error of this size is the rate at which Newton's
+/// method converges with the factor.
+fn passes_probe(pattern: &Pattern, values: &[f64], solve: impl FnOnce(&mut [f64])) -> bool {
+    let probe: Vec<f64> = (0..pattern.dofs()).map(|k| 1.0 + ((k * k + k / 3) % 7) as f64 / 7.0).collect();
+    let mut x = vec![0.0; probe.len()];
+    pattern.multiply_add(values, &probe, &mut x);
+    solve(&mut x);
+    x.iter().zip(&probe).all(|(x, p)| (x - p).abs() <= PROBE * p)
 }
 
 /// Adds `rho Q` of the fixing nodes to the lower values of the stiffness.

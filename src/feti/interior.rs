@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::cholesky::{Analysis, Lower, Workspace};
+use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use super::factor::{NotDefinite, Symbolic};
 use crate::assembly::pattern::Pattern;
 
@@ -61,17 +61,17 @@ pub fn analyse(whole: &[Rc<Symbolic>], boundaries: Vec<Vec<u32>>) -> Vec<Rc<Inte
 /// Numeric factors of the interior blocks of all own subdomains.
 pub struct InteriorFactors {
     symbolic: Vec<Rc<InteriorSymbolic>>,
-    values: Vec<Vec<f64>>,
+    factors: Vec<Factor>,
     workspace: Workspace,
     block: Vec<f64>,
 }
 
 impl InteriorFactors {
     /// Space for the factors.
-    pub fn new(symbolic: Vec<Rc<InteriorSymbolic>>) -> Self {
+    pub fn new(symbolic: Vec<Rc<InteriorSymbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
-        let values = symbolic.iter().map(|s| vec![0.0; s.cholesky.factor_length()]).collect();
-        Self { symbolic, values, workspace, block: Vec::new() }
+        let factors = symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)).collect();
+        Self { symbolic, factors, workspace, block: Vec::new() }
     }
 
     /// Which unknowns of an own subdomain are interior.
@@ -87,9 +87,13 @@ impl InteriorFactors {
         let InteriorSymbolic { interior, column_begin, rows, positions, cholesky, .. } = &*self.symbolic[own];
         self.block.clear();
         self.block.extend(positions.iter().map(|&at| stiffness[at as usize]));
-        self.workspace
-            .factorise(cholesky, Lower { column_begin, rows }, &self.block, &mut self.values[own])
-            .map_err(|breakdown| NotDefinite { subdomain, pivot: breakdown.place, dofs: interior.len() })
+        let (lower, factor) = (Lower { column_begin, rows }, &mut self.factors[own]);
+        let mut outcome = self.workspace.factorise(cholesky, lower, &self.block, factor);
+        if outcome.is_err() && factor.precision() == Precision::Single {
+            *factor = Factor::new(cholesky, Precision::Double);
+            outcome = self.workspace.factorise(cholesky, lower, &self.block, factor);
+        }
+        outcome.map_err(|breakdown| NotDefinite { subdomain, pivot: breakdown.place, dofs: interior.len() })
     }
 
     /// Replaces the interior part of `u`, zero on entry, by the one that is in equilibrium with its boundary part:
@@ -99,7 +103,7 @@ impl InteriorFactors {
         let mut forces = vec![0.0; u.len()];
         pattern.multiply_add(values, u, &mut forces);
         let mut inside: Vec<f64> = interior.iter().map(|&dof| -forces[dof as usize]).collect();
-        self.workspace.solve(cholesky, &self.values[own], &mut inside);
+        self.workspace.solve(cholesky, &self.factors[own], &mut inside);
         interior.iter().zip(&inside).for_each(|(&dof, x)| u[dof as usize] = *x);
     }
 }

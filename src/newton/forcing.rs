@@ -7,8 +7,8 @@
 /// Reduction of the gradient in the first step, and the least in later ones.
 const FIRST: f64 = 0.01;
 const LOOSEST: f64 = 0.03;
-/// The most that is asked for; quadratic convergence gains nothing beyond.
-const TIGHTEST: f64 = 1e-4;
+/// The most that is asked for: quadratic convergence gains nothing beyond, and factors in single precision can do it.
+pub const TIGHTEST: f64 = 1e-4;
 /// Factor on the squared decrease of the residual.
 const SHARE: f64 = 0.5;
 /// What the floor is lowered by beyond the ratio of wanted to true residual.

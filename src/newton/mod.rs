@@ -140,10 +140,18 @@ pub fn solve(
     let mut attempts: Vec<step::Step> = Vec::new();
     let outcome = loop {
         let watch = timer.total_seconds();
+        if problem.is_linear() {
+            forcing.drop = solver.linear_drop();
+        }
         let step = match solver.solve(problem, &u, &state, forcing, timer) {
             Ok(step) => step,
             Err(message) => break Outcome::Singular(message),
         };
+        // Perhaps the factors were not exact enough.
+        if step.outcome != qp::Outcome::Converged && solver.sharpen() {
+            attempts.push(step);
+            continue;
+        }
         if !matches!(step.outcome, qp::Outcome::Converged | qp::Outcome::LimitReached) {
             break if step.outcome == qp::Outcome::NotFinite {
                 Outcome::NotFinite
@@ -158,6 +166,7 @@ pub fn solve(
             }
             // Perhaps the program was solved too loosely for a descent direction.
             forcing.tighten();
+            solver.sharpen();
             attempts.push(step);
             continue;
         };

@@ -105,7 +105,7 @@ impl Programs {
             relative: self.settings.tolerance * forcing.floor,
             reference: self.reference,
             absolute: 0.0,
-            drop: if problem.is_linear() { 0.0 } else { forcing.drop },
+            drop: forcing.drop,
             products: self.settings.products,
         };
         if !problem.constraints.has_inequalities {

@@ -1,12 +1,13 @@
 //! One Newton step: tangents, factors, the dual quadratic program, and back to a displacement.
 
 use super::dual::Dual;
-use super::forcing::Forcing;
+use super::forcing::{Forcing, TIGHTEST};
 use super::problem::{State, TornProblem};
 use super::program::{Found, ProgramSettings, Programs};
 use super::recover;
 use crate::assembly::stiffness;
 use crate::feti::Torn;
+use crate::feti::cholesky::Precision;
 use crate::feti::factor::NotDefinite;
 use crate::feti::operator::DualOperator;
 use crate::feti::preconditioner::Preconditioner;
@@ -56,6 +57,22 @@ impl<'a> StepSolver<'a> {
     ) -> Self {
         let (tangents, yielding) = (vec![Vec::new(); own], vec![None; own]);
         Self { operator, projector, preconditioner, programs: Programs::new(settings), tangents, yielding }
+    }
+
+    /// From now on factorises in double precision; false if that was so before.
+    pub fn sharpen(&mut self) -> bool {
+        let before = self.operator.factors.precision();
+        self.operator.factors.set_precision(Precision::Double);
+        self.yielding.fill(None);
+        before == Precision::Single
+    }
+
+    /// How far one step of a linear problem may reduce the gradient.
+    pub fn linear_drop(&self) -> f64 {
+        match self.operator.factors.precision() {
+            Precision::Single => TIGHTEST,
+            Precision::Double => 0.0,
+        }
     }
 
     /// Solves for the step at `u`. Collective.

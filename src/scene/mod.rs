@@ -27,7 +27,7 @@ pub use body::{Axis, Body, Brick, Element};
 pub use decomposition::Decomposition;
 pub use error::{Fault, Place, SceneError};
 pub use material::Material;
-pub use solver::{Expansion, Preconditioner, Qp, Solver};
+pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
 pub use surface::{Contact, Face, Load, Support, SurfaceError, SurfaceName};
 
 /// A study: bodies, what holds and loads them, where they touch, how to cut and how to solve.

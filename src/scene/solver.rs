@@ -22,10 +22,12 @@ pub struct Solver {
     pub preconditioner: Preconditioner,
     /// How the active set grows inside SMALSE-M.
     pub expansion: Expansion,
+    /// What factors are stored in.
+    pub precision: Precision,
 }
 
 impl Default for Solver {
-    /// The paper's method and tolerances.
+    /// The paper's tolerances, and the fastest method.
     fn default() -> Self {
         Solver {
             newton_tolerance: 1e-4,
@@ -33,9 +35,10 @@ impl Default for Solver {
             newton_limit: 50,
             qp_tolerance: 1e-7,
             qp_limit: 5000,
-            qp: Qp::SmalseM,
-            preconditioner: Preconditioner::None,
+            qp: Qp::ActiveSet,
+            preconditioner: Preconditioner::Dirichlet,
             expansion: Expansion::ProjectedCg,
+            precision: Precision::Mixed,
         }
     }
 }
@@ -70,4 +73,14 @@ pub enum Expansion {
     ProjectedCg,
     /// A half step to the bound, then a projected gradient step of fixed length.
     Fixed,
+}
+
+/// What the factors of stiffness matrices are stored in. Residuals are always computed in double precision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// Single where that is exact enough for Newton's method to converge as fast, double elsewhere.
+    Mixed,
+    /// Double.
+    Double,
 }

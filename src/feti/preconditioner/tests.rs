@@ -3,6 +3,7 @@ use faer::{Mat, Side};
 
 use super::{Preconditioner, boundaries};
 use crate::constraint::Kind;
+use crate::feti::cholesky::Precision;
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::interior::{self, InteriorFactors};
 use crate::feti::operator::DualOperator;
@@ -30,7 +31,8 @@ impl<'a> Case<'a> {
         let own = stiffnesses.len();
         let interior = dirichlet.then(|| {
             let whole = analyse(setup.subdomains());
-            let mut interior = InteriorFactors::new(interior::analyse(&whole, boundaries(&setup.gather, own)));
+            let mut interior =
+                InteriorFactors::new(interior::analyse(&whole, boundaries(&setup.gather, own)), Precision::Double);
             for (k, values) in stiffnesses.iter().enumerate() {
                 interior.factorise(k, k, values).expect("the interior is held by its boundary");
             }
