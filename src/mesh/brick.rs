@@ -117,6 +117,22 @@ impl Brick {
         6 * self.cell(cell) + tet as u64
     }
 
+    /// The element around a point inside the brick, given in cells from its origin: its nodes and the values there of
+    /// their linear functions.
+    pub fn around(&self, at: [f64; 3]) -> ([u64; 4], [f64; 4]) {
+        let cell: [usize; 3] = std::array::from_fn(|a| (at[a] as usize).min(self.cells[a] - 1));
+        let inside: [f64; 3] = std::array::from_fn(|a| at[a] - cell[a] as f64);
+        let corner = |v: usize| [0, 1, 2].map(|a| (v >> a & 1) as f64);
+        let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
+        let (weights, tet) = TETS
+            .map(|tet| (barycentric(tet.map(corner), inside), tet))
+            .into_iter()
+            .reduce(|best, other| if least(&other.0) > least(&best.0) { other } else { best })
+            .expect("a cell has six elements");
+        let corners = self.corners(cell);
+        (tet.map(|v| corners[v]), weights)
+    }
+
     /// The layer of cells that touch a face.
     pub fn cells_on(&self, face: Face) -> Block {
         let mut block = self.all_cells();
@@ -153,6 +169,18 @@ impl Brick {
     pub fn triangle_count(&self, face: Face) -> u64 {
         2 * self.cell_count() / self.cells[face.axis()] as u64
     }
+}
+
+/// Values at a point of the linear functions that are one at a corner of a tetrahedron and zero at the others.
+fn barycentric(corners: [[f64; 3]; 4], point: [f64; 3]) -> [f64; 4] {
+    let edge = |k: usize| std::array::from_fn::<f64, 3, _>(|a| corners[k][a] - corners[0][a]);
+    let volume = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
+        a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    };
+    let to: [f64; 3] = std::array::from_fn(|a| point[a] - corners[0][a]);
+    let whole = volume(edge(1), edge(2), edge(3));
+    let [b, c, d] = [volume(to, edge(2), edge(3)), volume(edge(1), to, edge(3)), volume(edge(1), edge(2), to)];
+    [1.0 - (b + c + d) / whole, b / whole, c / whole, d / whole]
 }
 
 fn number(at: [usize; 3], extent: [usize; 3]) -> u64 {

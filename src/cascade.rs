@@ -1,0 +1,173 @@
+//! From the solution on a coarse mesh to a start on a finer one of the same bodies.
+//!
+//! The displacement is interpolated: the coarse elements' linear functions at the fine nodes. A contact is closed where
+//! the nearest coarse one is. Plastic state and multipliers follow from these two by the equations themselves.
+//! No rank ever holds a whole mesh: nodal values travel by rendezvous at the rank that a node's number points to.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::comm::{Comm, all_gather_u64};
+use crate::contact::ContactPair;
+use crate::decomposition::{BodyMesh, Subdomain};
+use crate::feti::Torn;
+
+/// Displacement of the coarse mesh at the nodes of own fine subdomains. Copies of a node get the same bits, on any
+/// number of ranks. Collective.
+pub fn interpolate(
+    comm: &dyn Comm,
+    coarse: (&[BodyMesh], &[Subdomain], &Torn),
+    fine: (&[BodyMesh], &[Subdomain]),
+) -> Torn {
+    let (coarse_bodies, coarse_subdomains, u) = coarse;
+    let (fine_bodies, fine_subdomains) = fine;
+    let around: Vec<Vec<([u64; 4], [f64; 4])>> = fine_subdomains
+        .iter()
+        .map(|s| s.nodes.iter().map(|&node| locate(&coarse_bodies[s.body], &fine_bodies[s.body], node)).collect())
+        .collect();
+    let needed = around.iter().flatten().flat_map(|(nodes, _)| *nodes).collect();
+    let values = fetch(comm, coarse_subdomains, u, needed);
+    around
+        .iter()
+        .map(|nodes| nodes.iter().flat_map(|(corners, weights)| mean(&values, corners, weights)).collect())
+        .collect()
+}
+
+/// The coarse element around a fine node: its nodes, numbered over all bodies, and the values of their linear functions.
+fn locate(coarse: &BodyMesh, fine: &BodyMesh, node: u64) -> ([u64; 4], [f64; 4]) {
+    let at = fine.brick.node_position(node - fine.first_node);
+    let in_cells = std::array::from_fn(|a| (at[a] * coarse.brick.cells[a]) as f64 / fine.brick.cells[a] as f64);
+    let (nodes, weights) = coarse.brick.around(in_cells);
+    (nodes.map(|n| coarse.first_node + n), weights)
+}
+
+fn mean(values: &HashMap<u64, [f64; 3]>, corners: &[u64; 4], weights: &[f64; 4]) -> [f64; 3] {
+    std::array::from_fn(|a| corners.iter().zip(weights).map(|(corner, w)| w * values[corner][a]).sum())
+}
+
+/// Displacements of some coarse nodes, wherever they are. Of several copies that of the lowest subdomain counts.
+fn fetch(comm: &dyn Comm, subdomains: &[Subdomain], u: &Torn, needed: HashSet<u64>) -> HashMap<u64, [f64; 3]> {
+    let ranks = comm.size() as u64;
+    let mut reports = vec![Vec::new(); comm.size()];
+    for (subdomain, u) in subdomains.iter().zip(u) {
+        for (&node, u) in subdomain.nodes.iter().zip(u.chunks_exact(3)) {
+            reports[(node % ranks) as usize].extend([node, u[0].to_bits(), u[1].to_bits(), u[2].to_bits()]);
+        }
+    }
+    let mut directory = HashMap::new();
+    for report in comm.all_to_all(reports).concat().chunks_exact(4) {
+        directory.entry(report[0]).or_insert([report[1], report[2], report[3]]);
+    }
+    let mut wishes = vec![Vec::new(); comm.size()];
+    needed.into_iter().for_each(|node| wishes[(node % ranks) as usize].push(node));
+    let answers = comm
+        .all_to_all(wishes)
+        .iter()
+        .map(|wish| wish.iter().flat_map(|node| [[*node].as_slice(), &directory[node]].concat()).collect())
+        .collect();
+    let answers = comm.all_to_all(answers).concat();
+    answers.chunks_exact(4).map(|a| (a[0], [a[1], a[2], a[3]].map(f64::from_bits))).collect()
+}
+
+/// Which fine contact pairs are closed: those whose slave node has a closed pair's as the nearest coarse node. `closed`
+/// lists closed coarse pairs of this rank by index. Collective.
+pub fn closed_contacts(
+    comm: &dyn Comm,
+    coarse: (&[BodyMesh], &[ContactPair]),
+    closed: &[u64],
+    fine: (&[BodyMesh], &[ContactPair]),
+) -> Vec<bool> {
+    let (coarse_bodies, coarse_pairs) = coarse;
+    let (fine_bodies, fine_pairs) = fine;
+    let closed: HashSet<(usize, u64)> = all_gather_u64(comm, closed)
+        .into_iter()
+        .map(|pair| &coarse_pairs[pair as usize])
+        .map(|pair| (pair.contact, pair.slave))
+        .collect();
+    let nearest = |node: u64| {
+        let body = fine_bodies.iter().rposition(|body| body.first_node <= node).expect("a node is in a body");
+        let (fine, coarse) = (&fine_bodies[body], &coarse_bodies[body]);
+        let at = fine.brick.node_position(node - fine.first_node);
+        let cells = (fine.brick.cells, coarse.brick.cells);
+        coarse.first_node
+            + coarse.brick.node(std::array::from_fn(|a| (2 * at[a] * cells.1[a] + cells.0[a]) / (2 * cells.0[a])))
+    };
+    fine_pairs.iter().map(|pair| closed.contains(&(pair.contact, nearest(pair.slave)))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::solo::Solo;
+    use crate::comm::threads;
+    use crate::fixture::{RANKS, two_bricks, two_bricks_by_metis};
+    use crate::scene::Scene;
+    use crate::study::{Discrete, discretise};
+
+    fn discrete(scene: &Scene, comm: &dyn Comm) -> Discrete {
+        discretise(scene, comm).expect("the scene has a discrete problem")
+    }
+
+    /// A displacement that is linear in each body, or not.
+    fn field(discrete: &Discrete, bend: f64) -> Torn {
+        let at = |body: usize, p: &[f64; 3]| {
+            let s = 1.0 + body as f64;
+            [s * p[0] - p[1] + bend * (3.0 * p[2]).sin(), 0.5 * p[2] + s, p[1] * s - bend * p[0] * p[1]]
+        };
+        let of = |s: &Subdomain| s.points.iter().flat_map(|p| at(s.body, p)).collect();
+        discrete.decomposition.subdomains.iter().map(of).collect()
+    }
+
+    fn pass(comm: &dyn Comm, coarse: &Discrete, fine: &Discrete, bend: f64) -> Torn {
+        let u = field(coarse, bend);
+        interpolate(
+            comm,
+            (&coarse.bodies, &coarse.decomposition.subdomains, &u),
+            (&fine.bodies, &fine.decomposition.subdomains),
+        )
+    }
+
+    const FINER: [&str; 2] = ["body.lower.brick.cells=[12, 4, 6]", "body.upper.brick.cells=[12, 4, 6]"];
+
+    #[test]
+    fn linear_displacements_pass_exactly() {
+        let (coarse, fine) = (discrete(&two_bricks(&[]), &Solo), discrete(&two_bricks(&FINER), &Solo));
+        for (found, exact) in pass(&Solo, &coarse, &fine, 0.0).iter().zip(field(&fine, 0.0)) {
+            assert!(found.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-13));
+        }
+    }
+
+    #[test]
+    fn ranks_and_subdomains_change_no_bit() {
+        let of = |comm: &dyn Comm, scenes: [Scene; 2]| {
+            let [coarse, fine] = scenes.map(|scene| discrete(&scene, comm));
+            let u = pass(comm, &coarse, &fine, 1.0);
+            let nodes = fine.decomposition.subdomains.iter().flat_map(|s| s.nodes.clone());
+            nodes.zip(u.concat().chunks_exact(3).map(|u| [0, 1, 2].map(|a| u[a].to_bits()))).collect::<Vec<_>>()
+        };
+        let bricks = || [two_bricks(&[]), two_bricks(&FINER)];
+        let alone: HashMap<_, _> = of(&Solo, bricks()).into_iter().collect();
+        for ranks in RANKS {
+            let metis =
+                || [two_bricks_by_metis(7), two_bricks(&[&FINER[..], &["decomposition.subdomains=9"]].concat())];
+            for found in threads::run(ranks, |comm| [of(comm, bricks()), of(comm, metis())].concat()).concat() {
+                assert_eq!(alone[&found.0], found.1);
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_contacts_are_closed() {
+        let (coarse, fine) = (discrete(&two_bricks(&[]), &Solo), discrete(&two_bricks(&FINER), &Solo));
+        let place = |d: &Discrete, pair: &ContactPair| {
+            let body = &d.bodies[1];
+            body.brick.coordinates(body.brick.node_position(pair.slave - body.first_node))
+        };
+        let closed: Vec<u64> =
+            (0..coarse.pairs.len() as u64).filter(|&k| place(&coarse, &coarse.pairs[k as usize])[0] < 2.5).collect();
+        let found = closed_contacts(&Solo, (&coarse.bodies, &coarse.pairs), &closed, (&fine.bodies, &fine.pairs));
+        assert!(found.contains(&true) && found.contains(&false));
+        for (pair, found) in fine.pairs.iter().zip(found) {
+            assert_eq!(found, place(&fine, pair)[0] < 2.5, "{:?}", place(&fine, pair));
+        }
+    }
+}
