@@ -9,7 +9,7 @@ Needs vtk, h5py, numpy and matplotlib.
 
 import argparse
 import pathlib
-import tomllib
+import re
 
 import h5py
 import matplotlib
@@ -104,12 +104,10 @@ class Result:
 
 def units_of(file):
     """Length and stress units, if the scene's text says them in the order "length, force, stress"."""
-    try:
-        scene = tomllib.loads(file["provenance/scene"][()].decode())
-        names = [name.strip() for name in scene["units"].split(",")]
-        return {"length": names[0], "stress": names[2]}
-    except (KeyError, IndexError, tomllib.TOMLDecodeError):
-        return {"length": "", "stress": ""}
+    text = file["provenance/scene"][()].decode() if "provenance/scene" in file else ""
+    line = re.search(r'^units = "(.*)"$', text, re.MULTILINE)
+    names = [name.strip() for name in line[1].split(",")] if line else []
+    return {"length": names[0], "stress": names[2]} if len(names) == 3 else {"length": "", "stress": ""}
 
 
 def add(data, name, values):
