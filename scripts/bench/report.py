@@ -64,18 +64,19 @@ def spread(values):
     return middle if len(values) == 1 else f"{middle} ({min(values):.3g} to {max(values):.3g})"
 
 
-def read():
-    """Groups by (level, variant, ranks); runs that failed are left out."""
+def read(variants):
+    """Groups by (level, variant, ranks); runs that failed, and variants that are measured no more, are left out."""
     kinds = {}
     for file in sorted((RESULTS / "raw").glob("*.jsonl")):
         for line in file.read_text().splitlines():
             record = json.loads(line)
-            if record["exit_code"] == 0 and record["summary"]:
+            if record["exit_code"] == 0 and record["summary"] and record["variant"] in variants:
                 kinds.setdefault((record["level"], record["variant"], record["ranks"]), []).append(record)
     return {kind: Group(records) for kind, records in kinds.items()}
 
 
 def thousands(value):
+    """A count with groups of three digits."""
     return "" if value is None else f"{value:,}".replace(",", " ")
 
 
@@ -264,7 +265,7 @@ def contents(variants, study):
     """Every file this writes, with its text."""
     paper = json.loads((RESULTS / "paper.json").read_text())
     references = json.loads((RESULTS / "reference.json").read_text())["levels"]
-    groups = read()
+    groups = read(variants)
     levels = {}
     for level, variant, ranks in sorted(groups, key=lambda kind: (kind[0], variants.index(kind[1]), kind[2])):
         if ranks == 2:
