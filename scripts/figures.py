@@ -9,7 +9,7 @@ Needs vtk, h5py, numpy and matplotlib.
 
 import argparse
 import pathlib
-import tomllib
+import re
 
 import h5py
 import matplotlib
@@ -17,10 +17,11 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.colors import ListedColormap
 from matplotlib.ticker import MaxNLocator
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLookupTable, vtkObject, vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkNonMergingPointLocator, vtkUnstructuredGrid
 from vtkmodules.vtkFiltersCore import vtkCellDataToPointData, vtkFeatureEdges
 from vtkmodules.vtkFiltersGeneral import vtkWarpVector
 from vtkmodules.vtkFiltersGeometry import vtkGeometryFilter
@@ -103,12 +104,10 @@ class Result:
 
 def units_of(file):
     """Length and stress units, if the scene's text says them in the order "length, force, stress"."""
-    try:
-        scene = tomllib.loads(file["provenance/scene"][()].decode())
-        names = [name.strip() for name in scene["units"].split(",")]
-        return {"length": names[0], "stress": names[2]}
-    except (KeyError, IndexError, tomllib.TOMLDecodeError):
-        return {"length": "", "stress": ""}
+    text = file["provenance/scene"][()].decode() if "provenance/scene" in file else ""
+    line = re.search(r'^units = "(.*)"$', text, re.MULTILINE)
+    names = [name.strip() for name in line[1].split(",")] if line else []
+    return {"length": names[0], "stress": names[2]} if len(names) == 3 else {"length": "", "stress": ""}
 
 
 def add(data, name, values):
@@ -139,6 +138,7 @@ def warped(data, scale):
 def edges_of(surface):
     """Where the undeformed surface has an edge: bending bodies get no new ones."""
     edges = vtkFeatureEdges()
+    edges.SetLocator(vtkNonMergingPointLocator())  # Bodies that touch have edges at the same place.
     edges.SetInputData(surface)
     edges.SetFeatureAngle(30)
     edges.ColoringOff()
@@ -211,6 +211,11 @@ def render(actors):
     return pixels[top:bottom, left:right]
 
 
+def bands_of(colours, count):
+    """A colour a band, without the darkest end of the map, where black edges would drown."""
+    return ListedColormap(matplotlib.colormaps[colours](np.linspace(0.07, 1, count)))
+
+
 def compose(pixels, title, label, ticks, colours, note, path):
     height = 6.4 * pixels.shape[0] / pixels.shape[1]
     figure = plt.figure(figsize=(8, height + 0.9), dpi=250)
@@ -246,7 +251,10 @@ def main():
     extract.Update()
     surface = extract.GetOutput()
     outline = edges_of(surface)
-    lines = [line_actor(outline, (0.65, 0.65, 0.65), 1.5, 0), line_actor(warped(outline, scale), (0.1, 0.1, 0.1), 2.5, 8)]
+    lines = [
+        line_actor(outline, (0.65, 0.65, 0.65), 1.5, nearer=-100),
+        line_actor(warped(outline, scale), (0.1, 0.1, 0.1), 2.5, nearer=8),
+    ]
     deformed = warped(surface, scale)
 
     length = f" [{result.units['length']}]" if result.units["length"] else ""
@@ -259,7 +267,7 @@ def main():
     for field, title, label, colours, remark in figures:
         values = vtk_to_numpy(surface.GetPointData().GetArray(field))
         ticks = MaxNLocator(7).tick_values(0.0, float(values.max()) or 1.0)
-        bands = matplotlib.colormaps[colours].resampled(BANDS_PER_TICK * (len(ticks) - 1))
+        bands = bands_of(colours, BANDS_PER_TICK * (len(ticks) - 1))
         pixels = render([surface_actor(deformed, field, (ticks[0], ticks[-1]), bands), *lines])
         path = arguments.out / f"{'displacement' if field == 'total' else field}.png"
         compose(pixels, title, label, ticks, bands, remark + note, path)
