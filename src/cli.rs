@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use thiserror::Error;
 
 use crate::comm::{Comm, Shares, ordered_sum};
@@ -16,7 +16,7 @@ use crate::monitor::timing::{PhaseTable, Timer, peak_rss_mb};
 use crate::results::OutputError;
 use crate::results::agree::root_texts;
 use crate::results::replace;
-use crate::results::summary::Summary;
+use crate::results::summary::{CascadeRow, Summary};
 use crate::results::vtkhdf;
 use crate::scene::{Scene, SceneError, library};
 use crate::study::{self, StudyError};
@@ -80,9 +80,37 @@ pub struct Solve {
     /// none, lumped or dirichlet. Short for --set solver.preconditioner=...
     #[arg(long, value_name = "NAME")]
     preconditioner: Option<String>,
+    /// Solve coarser levels first and start from them: auto (where it pays), on or off.
+    #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
+    cascade: Cascade,
     /// Life signs inside a Newton step: auto, plain or off.
     #[arg(long, value_name = "MODE", default_value = "auto", value_parser = progress)]
     progress: Mode,
+}
+
+/// When coarser levels are solved first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Cascade {
+    /// Where the problem is not linear.
+    Auto,
+    /// Always.
+    On,
+    /// Never.
+    Off,
+}
+
+impl Cascade {
+    /// The levels to solve before `level`, coarsest first.
+    fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
+        let linear = scene.contact.is_empty() && scene.material.values().all(|m| m.yield_stress.is_none());
+        if self == Self::Off || (self == Self::Auto && linear) {
+            return Vec::new();
+        }
+        let mut levels: Vec<usize> =
+            std::iter::successors(Some(level), |l| Some(l - 1)).skip(1).take_while(|l| *l > 0).collect();
+        levels.reverse();
+        levels
+    }
 }
 
 /// Arguments of `check`.
@@ -162,8 +190,20 @@ impl Command {
     }
 }
 
-/// Rank 0 finds the scene's text; everybody parses it.
-fn load(source: &Source, sets: &[String], comm: &dyn Comm) -> Result<Scene, Failure> {
+/// A scene as it was found.
+struct Found {
+    text: String,
+    origin: String,
+}
+
+impl Found {
+    fn at_level(&self, level: usize, sets: &[String]) -> Result<Scene, Failure> {
+        Scene::from_text(&self.text, &self.origin, level, sets).map_err(|error| Failure::Scene(error.to_string()))
+    }
+}
+
+/// Rank 0 finds the scene's text; everybody gets it.
+fn find(source: &Source, comm: &dyn Comm) -> Result<Found, Failure> {
     let found = if comm.rank() == 0 { Scene::find(&source.scene) } else { Ok(Default::default()) };
     let texts = match &found {
         Ok((text, origin)) => root_texts(comm, ["", "", text, origin]),
@@ -175,7 +215,7 @@ fn load(source: &Source, sets: &[String], comm: &dyn Comm) -> Result<Scene, Fail
         "scene" => return Err(Failure::Scene(texts[1].clone())),
         _ => {}
     }
-    Scene::from_text(&texts[2], &texts[3], source.level, sets).map_err(|error| Failure::Scene(error.to_string()))
+    Ok(Found { text: texts[2].clone(), origin: texts[3].clone() })
 }
 
 /// How results of a scene are called: its name, or the stem of its file, and the level if there is one.
@@ -188,31 +228,47 @@ fn run_name(source: &Source) -> String {
 fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     let timer = Timer::start();
     let mut monitor = Monitor::of_rank(comm.rank(), arguments.progress);
-    let Solve { source, out, qp, preconditioner, .. } = arguments;
+    let Solve { source, out, qp, preconditioner, cascade, .. } = arguments;
     let shorthand = |key: &str, value: Option<String>| value.map(|v| format!("solver.{key}={v}"));
     let mut sets = source.sets.clone();
     sets.extend(shorthand("qp", qp));
     sets.extend(shorthand("preconditioner", preconditioner));
-    let scene = load(&source, &sets, comm)?;
+    let found = find(&source, comm)?;
+    let scene = found.at_level(source.level, &sets)?;
     let result = out.join(format!("{}.vtkhdf", run_name(&source)));
     let summary_file = source.summary.clone().unwrap_or_else(|| out.join(format!("{}.json", run_name(&source))));
     for file in [&result, &summary_file] {
         replace::probe(comm, file).map_err(Failure::Place)?;
     }
 
-    let discrete = timer.time("discretisation", || study::discretise(&scene, comm))?;
-    let sizes = study::sizes(&discrete, comm);
-    monitor.event(&Event::Sizes { scene: source.scene.clone(), level: source.level, ranks: comm.size(), sizes });
+    let mut coarser: Option<(study::Discrete, study::Solved)> = None;
+    let mut rows = Vec::new();
+    for level in cascade.before(source.level, &scene) {
+        let watch = timer.total_seconds();
+        // A level that is too coarse for the scene is left out.
+        let Ok(scene) = found.at_level(level, &sets) else { continue };
+        let (discrete, solved) = solve_level(&source, level, &scene, coarser.take(), comm, &timer, &mut monitor)?;
+        let Summary { newton_iterations, counters, sizes, converged, .. } = &solved.summary;
+        rows.push(CascadeRow {
+            level,
+            subdomains: sizes.subdomains,
+            newton_iterations: *newton_iterations,
+            hessian_multiplications: counters.hessian_multiplications,
+            factorisations: counters.factorisations,
+            seconds: timer.total_seconds() - watch,
+        });
+        coarser = (*converged == Some(true)).then_some((discrete, solved));
+    }
+    let (discrete, mut solved) = solve_level(&source, source.level, &scene, coarser, comm, &timer, &mut monitor)?;
     let warnings = warnings(&scene, &discrete, comm);
     warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
-
-    let mut solved = study::solve(&scene, &discrete, comm, &timer, &mut |event| monitor.event(&event))?;
     timer.time("output", || vtkhdf::write(comm, &result, &solved.piece, &solved.records))?;
 
     let table = PhaseTable::gather(comm, &timer);
     let summary = &mut solved.summary;
     describe_run(summary, &source, comm);
     summary.warnings = warnings;
+    summary.cascade = rows;
     summary.time = table.max_seconds();
     summary.time_total = Some(table.total_seconds);
     summary.write(comm, &summary_file)?;
@@ -229,9 +285,28 @@ fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     Ok(i32::from(!converged))
 }
 
+/// Discretises and solves one level, from the solution of a coarser one if there is one. Collective.
+fn solve_level(
+    source: &Source,
+    level: usize,
+    scene: &Scene,
+    coarser: Option<(study::Discrete, study::Solved)>,
+    comm: &dyn Comm,
+    timer: &Timer,
+    monitor: &mut Monitor,
+) -> Result<(study::Discrete, study::Solved), StudyError> {
+    let discrete = timer.time("discretisation", || study::discretise(scene, comm))?;
+    let sizes = study::sizes(&discrete, comm);
+    monitor.event(&Event::Sizes { scene: source.scene.clone(), level, ranks: comm.size(), sizes });
+    let start = coarser
+        .map(|(coarse, solved)| timer.time("interpolation", || study::refine(comm, (&coarse, &solved), &discrete)));
+    let solved = study::solve(scene, &discrete, comm, start, timer, &mut |event| monitor.event(&event))?;
+    Ok((discrete, solved))
+}
+
 fn check(source: &Source, comm: &dyn Comm) -> Result<i32, Failure> {
     let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
-    let scene = load(source, &source.sets, comm)?;
+    let scene = find(source, comm)?.at_level(source.level, &source.sets)?;
     if let Some(file) = &source.summary {
         replace::probe(comm, file).map_err(Failure::Place)?;
     }

@@ -5,11 +5,13 @@ use std::time::SystemTime;
 use thiserror::Error;
 
 use crate::assembly::loads::{self, Traction};
+use crate::cascade;
 use crate::comm::{Comm, Shares, ordered_sum};
 use crate::constraint::{ConstraintError, Constraints, Kind, Support};
 use crate::contact::surface::GatheredSurface;
 use crate::contact::{ContactError, ContactPair, matching};
 use crate::decomposition::{self, BodyMesh, Cut, Decomposition, Surface};
+use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::factor::{Factors, analyse};
@@ -184,9 +186,27 @@ pub struct Solved {
     pub piece: Piece,
     /// What is stored beside the fields.
     pub records: Records,
+    /// This rank's displacement.
+    pub u: Torn,
+    /// Closed contact pairs whose rows are on this rank, by index.
+    pub closed: Vec<u64>,
 }
 
-/// Solves a discretised scene; `report` is told of every Newton step. Collective.
+/// What a solved scene suggests as the start on a finer mesh of the same bodies. Collective.
+pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) -> newton::Start {
+    let (coarse, solved) = coarse;
+    let u = cascade::interpolate(
+        comm,
+        (&coarse.bodies, &coarse.decomposition.subdomains, &solved.u),
+        (&fine.bodies, &fine.decomposition.subdomains),
+    );
+    let (from, to) = ((&coarse.bodies[..], &coarse.pairs[..]), (&fine.bodies[..], &fine.pairs[..]));
+    let closed = cascade::closed_contacts(comm, from, &solved.closed, to);
+    let held = |kind| if let Kind::Contact { pair } = kind { closed[pair] } else { true };
+    newton::Start { u, held: Some(fine.constraints.rows.iter().map(|row| held(row.kind)).collect()) }
+}
+
+/// Solves a discretised scene, from rest or from a start; `report` is told of every Newton step. Collective.
 ///
 /// # Errors
 /// If the constraints leave a rigid motion free.
@@ -194,6 +214,7 @@ pub fn solve(
     scene: &Scene,
     discrete: &Discrete,
     comm: &dyn Comm,
+    start: Option<newton::Start>,
     timer: &Timer,
     report: &mut dyn FnMut(Event),
 ) -> Result<Solved, StudyError> {
@@ -248,7 +269,7 @@ pub fn solve(
     };
     let operator = DualOperator::new(Factors::new(symbolic, precision), &gather);
     let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, subdomains.len());
-    let solution = newton::solve(&problem, &mut steps, &settings, timer, &mut |record| {
+    let solution = newton::solve(&problem, &mut steps, &settings, start, timer, &mut |record| {
         report(Event::NewtonStep(newton_row(record)))
     });
 
@@ -259,7 +280,8 @@ pub fn solve(
         provenance: provenance::collect(comm, &scene.to_toml(), shares, started),
         convergence: convergence(&summary.newton),
     };
-    Ok(Solved { summary, piece, records })
+    let closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
+    Ok(Solved { summary, piece, records, u: solution.u, closed })
 }
 
 fn newton_row(record: &StepRecord) -> NewtonRow {

@@ -27,7 +27,10 @@ impl Sink for Plain {
 impl Plain {
     fn lines(&mut self, event: &Event) -> Vec<String> {
         match event {
-            Event::Sizes { scene, level, ranks, sizes } => size_lines(scene, *level, *ranks, sizes),
+            Event::Sizes { scene, level, ranks, sizes } => {
+                self.newton_header_written = false;
+                size_lines(scene, *level, *ranks, sizes)
+            }
             Event::Memory { megabytes } => {
                 vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together", "memory estimate")]
             }

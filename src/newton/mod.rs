@@ -100,6 +100,14 @@ pub struct StepRecord {
     pub seconds: f64,
 }
 
+/// Where to start from.
+pub struct Start {
+    /// Torn displacement.
+    pub u: Torn,
+    /// Rows that hold there: all equalities and the closed contacts; `None` if nothing is known of contacts.
+    pub held: Option<Vec<bool>>,
+}
+
 /// The solution and what it took.
 pub struct Solution {
     /// Torn displacement; copies agree and the bodies do not overlap, to round-off.
@@ -122,17 +130,21 @@ pub struct Solution {
     pub plastic_elements: usize,
 }
 
-/// Solves from rest; `report` is told of every step. Collective.
+/// Solves from rest or from `start`; `report` is told of every step. Collective.
 pub fn solve(
     problem: &TornProblem,
     solver: &mut StepSolver,
     settings: &Settings,
+    start: Option<Start>,
     timer: &Timer,
     report: &mut dyn FnMut(&StepRecord),
 ) -> Solution {
-    let mut u = problem.gather.zeros();
+    let (mut u, held) = start.map_or_else(|| (problem.gather.zeros(), None), |start| (start.u, start.held));
+    if held.is_some() {
+        problem.make_admissible(&mut u);
+    }
     let mut state = problem.evaluate(&u);
-    let mut lambda = vec![0.0; problem.gather.rows()];
+    let mut lambda = held.map_or_else(|| vec![0.0; problem.gather.rows()], |held| solver.expect(problem, &state, held));
     let mut residuals = problem.residuals(&u, &state, &lambda);
     let mut steps = Vec::new();
     let mut admissible = problem.is_admissible(&u);

@@ -72,6 +72,15 @@ impl TornProblem<'_> {
         }
     }
 
+    /// `f - F(u)`, torn.
+    pub fn unbalance(&self, state: &State) -> Torn {
+        let mut forces = self.loads.clone();
+        for (f, internal) in forces.iter_mut().zip(&state.forces) {
+            f.iter_mut().zip(internal).for_each(|(f, i)| *f -= i);
+        }
+        forces
+    }
+
     /// `(F(u) - f)'v`, the slope of `J` along `v`. One collective.
     pub fn slope(&self, state: &State, v: &Torn) -> f64 {
         let partial: Vec<f64> =

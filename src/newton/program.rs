@@ -73,6 +73,12 @@ impl Programs {
         Self { settings, last: None, reference: None, norm: None }
     }
 
+    /// Starts from these multipliers, which act on the held rows; from scratch if these leave a rigid motion free.
+    /// Collective.
+    pub fn expect(&mut self, coarse: &Coarse, lambda: &[f64], held: Vec<bool>) {
+        self.last = CoarseFace::new(coarse, held).ok().map(|face| (lambda.to_vec(), face));
+    }
+
     /// Multipliers with `G l = e` next to the last ones: the smallest such if there are none.
     pub fn start(&self, coarse: &Coarse, rows: usize, balance: Vec<f64>) -> Warm {
         let mut lambda = self.last.as_ref().map_or_else(|| vec![0.0; rows], |(last, _)| last.clone());

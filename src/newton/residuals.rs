@@ -79,10 +79,7 @@ impl TornProblem<'_> {
             .zip(lambda)
             .map(|(row, &l)| if row.is_inequality() { l } else { 0.0 })
             .collect();
-        let mut v = self.loads.clone();
-        for (v, f) in v.iter_mut().zip(&state.forces) {
-            v.iter_mut().zip(f).for_each(|(v, f)| *v -= f);
-        }
+        let mut v = self.unbalance(state);
         self.gather.add_transpose(-1.0, &contact, &mut v);
         v
     }

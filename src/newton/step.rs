@@ -59,6 +59,24 @@ impl<'a> StepSolver<'a> {
         Self { operator, projector, preconditioner, programs: Programs::new(settings), tangents, yielding }
     }
 
+    /// Starts from the multipliers that a displacement and the rows that hold there suggest; returns them. `B B' = I`, so
+    /// they are `B (f - F(u))` on these rows. Collective.
+    pub fn expect(&mut self, problem: &TornProblem, state: &State, held: Vec<bool>) -> Vec<f64> {
+        let mut lambda = vec![0.0; held.len()];
+        problem.gather.apply(&problem.unbalance(state), &mut lambda);
+        for ((l, row), &held) in lambda.iter_mut().zip(&problem.constraints.rows).zip(&held) {
+            *l = if !held {
+                0.0
+            } else if row.is_inequality() {
+                l.max(0.0)
+            } else {
+                *l
+            };
+        }
+        self.programs.expect(&self.projector.coarse, &lambda, held);
+        lambda
+    }
+
     /// From now on factorises in double precision; false if that was so before.
     pub fn sharpen(&mut self) -> bool {
         let before = self.operator.factors.precision();
@@ -91,10 +109,7 @@ impl<'a> StepSolver<'a> {
         let factorisations = self.update_tangents(problem, u, timer)?;
         let rows = problem.gather.rows();
 
-        let mut forces = problem.loads.clone();
-        for (f, internal) in forces.iter_mut().zip(&state.forces) {
-            f.iter_mut().zip(internal).for_each(|(f, i)| *f -= i);
-        }
+        let forces = problem.unbalance(state);
         let coarse = &self.projector.coarse;
         let warm = timer.time("coarse problem", || {
             self.programs.start(coarse, rows, recover::resultants(problem, coarse, &forces))

@@ -24,7 +24,8 @@ fn plastic(sets: &[&str]) -> Scene {
 fn solve(scene: &Scene, ranks: usize) -> (Summary, Vec<u64>) {
     let parts = threads::run(ranks, |comm| {
         let discrete = study::discretise(scene, comm).expect("the scene has a discrete problem");
-        let solved = study::solve(scene, &discrete, comm, &Timer::start(), &mut |_| ()).expect("the bodies are held");
+        let solved =
+            study::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("the bodies are held");
         let field = solved.piece.point_data.into_iter().find(|field| field.name == "displacement");
         let Some(Field { values: Values::Real(u), .. }) = field else { panic!("displacements are real") };
         (solved.summary, u)

@@ -74,6 +74,8 @@ pub struct Summary {
     pub warnings: Vec<String>,
     /// One row a Newton step.
     pub newton: Vec<NewtonRow>,
+    /// Coarser levels that were solved before for a start, coarsest first.
+    pub cascade: Vec<CascadeRow>,
 }
 
 /// Sizes of the problem, in the paper's way of counting rows.
@@ -131,6 +133,23 @@ pub struct Residuals {
     /// Pressure across open gaps.
     #[serde(rename = "residual_complementarity")]
     pub complementarity: Option<f64>,
+}
+
+/// What the solution on a coarser level took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct CascadeRow {
+    /// Refinement level.
+    pub level: usize,
+    /// Subdomains.
+    pub subdomains: u64,
+    /// Newton steps.
+    pub newton_iterations: Option<u64>,
+    /// Every application of F.
+    pub hessian_multiplications: Option<u64>,
+    /// Factorisations of subdomain matrices.
+    pub factorisations: Option<u64>,
+    /// Wall time in seconds.
+    pub seconds: f64,
 }
 
 /// One Newton step.
