@@ -1,4 +1,5 @@
-//! Runs the program under `mpirun` as a user would, with a time limit, and reads back what it wrote.
+//! Runs the program as a user would, under `mpirun` for more than one rank, with a time limit, and reads back what it
+//! wrote.
 
 #![allow(dead_code, reason = "every test binary compiles this module and uses part of it")]
 
@@ -101,8 +102,12 @@ pub fn scene_file(directory: &Path, text: &str) -> String {
 fn launch(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
     // A failed test poisons the lock, which guards no data.
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    let mut command = Command::new("mpirun");
-    command.args(["-np", &ranks.to_string(), env!("CARGO_BIN_EXE_fetiplast")]).args(arguments);
+    let program = env!("CARGO_BIN_EXE_fetiplast");
+    let mut command = if ranks == 1 { Command::new(program) } else { Command::new("mpirun") };
+    if ranks > 1 {
+        command.args(["-np", &ranks.to_string(), program]);
+    }
+    command.args(arguments);
     command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
     command.env("OMPI_MCA_rmaps_base_oversubscribe", "1").env("RUST_BACKTRACE", "1");
     if ranks > 2 {
@@ -113,13 +118,13 @@ fn launch(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
     command.stdout(File::create(&streams[0]).unwrap()).stderr(File::create(&streams[1]).unwrap());
     let status = wait(command);
     let [stdout, stderr] = streams.map(|path| fs::read_to_string(path).unwrap());
-    let code = status.code().unwrap_or_else(|| panic!("mpirun ended by a signal: {stderr}"));
+    let code = status.code().unwrap_or_else(|| panic!("{status}: {stderr}"));
     Run { code, stdout, stderr, directory }
 }
 
 /// The end of a command, which is killed and a failure of the test if it does not come in time.
 fn wait(mut command: Command) -> ExitStatus {
-    let mut child = command.spawn().expect("mpirun can be started");
+    let mut child = command.spawn().expect("the program can be started");
     let start = Instant::now();
     loop {
         if let Some(status) = child.try_wait().unwrap() {
