@@ -1,5 +1,5 @@
 //! Scenes that are hard for the method: near incompressibility, perfect plasticity, jumps of stiffness, degenerate
-//! contact, bodies that only contact holds, decompositions that fall apart or do not cut at all.
+//! contact, bodies that only contact holds, decompositions into shreds or into whole bodies.
 
 mod common;
 
@@ -58,15 +58,11 @@ fn almost_perfect_plasticity_below_collapse_converges() {
 }
 
 #[test]
-fn a_million_times_stiffer_upper_body_converges() {
-    let summary = coarse(&["material.upper.young=2.1e11", "load.top.traction.2=-30"]);
-    assert_balance(&summary, 9e7);
-}
-
-#[test]
-fn a_million_times_stiffer_lower_body_converges() {
-    let summary = coarse(&["material.lower.young=2.1e11", "load.top.traction.2=-30"]);
-    assert_balance(&summary, 9e7);
+fn a_million_times_stiffer_body_converges_with_scaling() {
+    for stiff in ["material.upper.young=2.1e11", "material.lower.young=2.1e11"] {
+        let summary = coarse(&[stiff, "load.top.traction.2=-30", "solver.preconditioner=lumped"]);
+        assert_balance(&summary, 9e7);
+    }
 }
 
 #[test]
@@ -98,12 +94,11 @@ fn one_subdomain_per_body_needs_no_gluing() {
 }
 
 #[test]
-fn metis_parts_that_fall_apart_are_split_and_solved() {
-    let summary =
-        assert_solved(solve(RANKS, "two-blocks", &[&COARSE[..2], &["decomposition.subdomains=150"]].concat()));
-    let subdomains = number(&summary, "subdomains");
-    assert!(subdomains > 150.0, "no part fell apart: {subdomains}");
-    assert_balance(&summary, 4.5e8);
+fn ragged_parts_of_two_elements_carry_the_contact_patch() {
+    let summary = assert_solved(solve(RANKS, "patch", &["decomposition.subdomains=384"]));
+    assert!(number(&summary, "subdomains") >= 384.0, "a part is split, never merged");
+    assert_close("contact force", vector(&summary["contact_force"])[2], 315e6, 1e-5);
+    assert_close("largest stress", number(&summary, "max_von_mises"), 315.0, 1e-4);
 }
 
 /// A gap of zero that no force closes: the load pulls the lower body down, away from the upper one.

@@ -131,6 +131,7 @@ fn assert_blocks(push: f64, gap: f64, stress: f64, sets: &[&str]) {
 #[test]
 fn two_elastic_blocks_share_the_push() {
     assert_blocks(3.0, 0.0, 315.0, &[]);
+    assert_blocks(3.0, 0.0, 315.0, &["solver.qp=active-set"]);
 }
 
 #[test]
@@ -141,6 +142,7 @@ fn two_yielding_blocks_share_the_push() {
 #[test]
 fn a_gap_takes_its_part_of_the_push() {
     assert_blocks(10.0, 1.0, 472.5, &[]);
+    assert_blocks(10.0, 1.0, 472.5, &["solver.qp=active-set"]);
 }
 
 #[test]
@@ -149,7 +151,7 @@ fn push_and_gap_shifted_alike_give_the_same_stress() {
 }
 
 #[test]
-fn blocks_cut_by_metis_or_preconditioned_share_the_push_alike() {
+fn blocks_cut_by_metis_or_solved_with_a_preconditioner_share_the_push_alike() {
     assert_blocks(10.0, 1.0, 472.5, &["decomposition.subdomains=9"]);
     assert_blocks(10.0, 1.0, 472.5, &["solver.preconditioner=lumped"]);
     assert_blocks(10.0, 1.0, 472.5, &["solver.preconditioner=dirichlet"]);

@@ -71,8 +71,8 @@ fn metis_parts_give_the_same_bits_on_1_2_3_and_5_ranks() {
 }
 
 #[test]
-fn preconditioned_steps_give_the_same_bits_on_1_2_3_and_5_ranks() {
-    let sets = [&COARSE[..], &["solver.preconditioner=dirichlet"]].concat();
+fn preconditioned_active_sets_give_the_same_bits_on_1_2_3_and_5_ranks() {
+    let sets = [&COARSE[..], &["solver.qp=active-set", "solver.preconditioner=dirichlet"]].concat();
     assert_eq!(assert_independent_of_ranks("two-blocks", &sets, &RANKS), 6);
 }
 
