@@ -11,7 +11,7 @@ use crate::feti::Torn;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residuals {
     /// Euclidean norm of the unbalanced nodal forces over that of the applied or internal nodal forces (or a hundred
-    /// millionth of the terms that these are sums of, see [`SIGNIFICANT`]).
+    /// millionth of the terms that these are sums of, where bodies move without strain).
     pub equilibrium: f64,
     /// Largest distance of a copy from its node's mean, or of a supported node from its prescribed value, over the
     /// largest displacement.
