@@ -16,6 +16,9 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 NODES_OF_TYPE = {10: 4, 12: 8}
 
+NAN_WHERE_UNDEFINED = {"contact_gap"}
+"""Fields that exist on a part of the mesh only: there is no gap off the slave surfaces."""
+
 
 def check_hdf5(path):
     """Groups, lengths and values as the format wants them; returns what VTK should find again."""
@@ -37,10 +40,8 @@ def check_hdf5(path):
         for group, rows in (("PointData", points.sum()), ("CellData", cells.sum())):
             for name, field in grid[group].items():
                 assert len(field) == rows, f"{name}: {len(field)} rows for {rows}"
-                values = field[:]
-                if name == "contact_gap":  # NaN where there is no contact
-                    values = values[~np.isnan(values)]
-                assert np.isfinite(values).all(), f"{name} has values that are not finite"
+                odd = ~np.isfinite(field[:]) & ~(np.isnan(field[:]) & (name in NAN_WHERE_UNDEFINED))
+                assert not odd.any(), f"{name} has values that are not finite"
         assert grid["PointData/displacement"].shape == (points.sum(), 3)
         columns = {len(column) for column in file["convergence"].values()}
         assert len(columns) <= 1, f"columns of different lengths: {columns}"
@@ -86,7 +87,7 @@ def check_vtk(path, points, cells, fields):
     for group, of in (("PointData", "GetPointData"), ("CellData", "GetCellData")):
         for name, values in fields[group].items():
             read = np.concatenate([vtk_to_numpy(getattr(b, of)().GetArray(name)) for b in blocks])
-            assert np.array_equal(read, values, equal_nan=values.dtype.kind == "f"), f"{name} differs"
+            assert np.array_equal(read, values, equal_nan=True), f"{name} differs"
     print(f"VTK:  {data.GetClassName()}, {len(blocks)} blocks with points, {cells} cells, every value equal")
 
 
