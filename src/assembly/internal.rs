@@ -2,6 +2,7 @@
 
 use super::{displacements, geometry};
 use crate::decomposition::Subdomain;
+use crate::element::tet4::Tet4;
 use crate::material::{History, Material};
 use crate::tensor::{Voigt, apply, contract};
 
@@ -12,15 +13,44 @@ pub struct Internal {
     pub energy: f64,
     /// Elements that yield.
     pub plastic: usize,
+    /// What could cancel.
+    pub terms: Terms,
+}
+
+/// Size of the terms that add up to strains and internal forces. A body that moves as a whole has large terms that
+/// cancel to round-off.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Terms {
+    /// Sum over the elements of `V (lambda + 2 mu) (sum_a |g_a| |u_a|)^2` (energy).
+    pub energy: f64,
+    /// Sum over the elements and their nodes of `(V (lambda + 2 mu) |g_a| sum_b |g_b| |u_b|)^2` (force squared).
+    pub force_squares: f64,
+}
+
+impl Terms {
+    fn add(&mut self, element: &Tet4, modulus: f64, u: &[f64; 12]) {
+        let steepness = element.gradients.map(|g| g.iter().map(|x| x * x).sum::<f64>());
+        let lengths = steepness
+            .iter()
+            .zip(u.as_chunks::<3>().0)
+            .map(|(s, u)| (s * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])).sqrt());
+        let strain: f64 = lengths.sum();
+        let stress = element.volume * modulus * strain;
+        self.energy += stress * strain;
+        self.force_squares += stress * stress * steepness.iter().sum::<f64>();
+    }
 }
 
 /// Adds the internal forces at `u`, one step from rest, to `forces`.
 pub fn add_forces(subdomain: &Subdomain, material: &Material, u: &[f64], forces: &mut [f64]) -> Internal {
     let rest = History::default();
+    let modulus = material.lambda() + 2.0 * material.shear_modulus();
     let mut sum = Internal::default();
     for nodes in &subdomain.elements {
         let element = geometry(subdomain, nodes);
-        let response = material.respond(&element.strain(&displacements(u, nodes)), &rest);
+        let u = displacements(u, nodes);
+        sum.terms.add(&element, modulus, &u);
+        let response = material.respond(&element.strain(&u), &rest);
         sum.energy += element.volume * response.energy;
         sum.plastic += usize::from(response.plastic);
         let mut local = [0.0; 12];

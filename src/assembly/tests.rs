@@ -61,6 +61,38 @@ fn a_linear_displacement_leaves_no_force_inside_whether_elastic_or_plastic() {
 }
 
 #[test]
+fn a_translation_has_terms_that_cancel() {
+    for scene in shapes() {
+        on_ranks(&scene, 1, |setup| {
+            for subdomain in setup.subdomains() {
+                let u = [1.0, -2.0, 3.0].repeat(subdomain.nodes.len());
+                let mut forces = vec![0.0; u.len()];
+                let found = internal::add_forces(subdomain, &STEEL, &u, &mut forces);
+                let force_squares: f64 = forces.iter().map(|f| f * f).sum();
+                assert!(found.energy <= 1e-30 * found.terms.energy);
+                assert!(force_squares <= 1e-30 * found.terms.force_squares);
+                assert!(found.terms.energy > 0.0 && found.terms.force_squares > 0.0);
+            }
+        });
+    }
+}
+
+#[test]
+fn terms_are_no_less_than_what_is_left_of_them() {
+    for scene in shapes() {
+        on_ranks(&scene, 1, |setup| {
+            for (subdomain, u) in setup.subdomains().iter().zip(setup.displacements(4)) {
+                let mut forces = vec![0.0; u.len()];
+                let found = internal::add_forces(subdomain, &Material::elastic(210.0, 0.29), &u, &mut forces);
+                assert!(found.terms.energy >= found.energy && found.energy > 0.0);
+                // Random displacements do not cancel.
+                assert!(found.terms.energy <= 100.0 * found.energy);
+            }
+        });
+    }
+}
+
+#[test]
 fn elastic_forces_energy_and_norm_are_those_of_the_stiffness() {
     for scene in shapes() {
         on_ranks(&scene, 1, |setup| {

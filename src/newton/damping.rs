@@ -11,6 +11,8 @@ use crate::monitor::timing::Timer;
 const SUFFICIENT: f64 = 1e-4;
 /// The slope is near zero when it is below this share of its first value.
 const FLAT: f64 = 0.1;
+/// Relative error of strains that are sums of cancelling terms.
+const ROUNDING: f64 = 1e-15;
 /// Evaluations of `J` before the direction is given up.
 const TRIALS: usize = 30;
 
@@ -51,8 +53,10 @@ pub fn search(
     }
     let first_slope = problem.slope(state, du);
     // Below this, energies differ by round-off only.
-    let noise =
-        1e-12 * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs());
+    let cancelled = ROUNDING * full.state.terms.energy.sqrt();
+    let noise = 1e-12
+        * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs())
+        + cancelled * (cancelled + 2.0 * state.internal_energy.abs().sqrt());
     let lowers = |t: &Damped| t.state.energy <= state.energy + SUFFICIENT * t.length * first_slope.min(0.0) + noise;
     if lowers(&full) {
         return Some(full);

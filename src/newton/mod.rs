@@ -182,7 +182,7 @@ pub fn solve(
             attempts.push(step);
             continue;
         };
-        let criterion = problem.relative_change(&u, &damped.u);
+        let criterion = problem.relative_change(&u, &damped.u, &damped.state.terms);
         u = damped.u;
         state = damped.state;
         lambda = step.lambda;

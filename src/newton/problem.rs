@@ -1,6 +1,6 @@
 //! The torn nonlinear problem: `J`, `F(u)`, and the admissible set.
 
-use crate::assembly::internal;
+use crate::assembly::internal::{self, Terms};
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
@@ -41,7 +41,13 @@ pub struct State {
     pub external_work: f64,
     /// Elements that yield.
     pub plastic: usize,
+    /// What could cancel in forces and energies.
+    pub terms: Terms,
 }
+
+/// Energies and forces are compared with those that are there, and at least with this share of the terms that they are
+/// sums of (in the energy norm, of its root): where bodies move without strain, all that is there is round-off.
+pub(super) const SIGNIFICANT: f64 = 1e-8;
 
 /// `x'y` of local vectors.
 pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
@@ -57,18 +63,21 @@ impl TornProblem<'_> {
     /// Internal forces and energies at `u`. One collective.
     pub fn evaluate(&self, u: &Torn) -> State {
         let mut forces = self.gather.zeros();
-        let mut partial = Vec::with_capacity(3 * u.len());
+        let mut partial = Vec::with_capacity(5 * u.len());
         for (own, subdomain) in self.subdomains.iter().enumerate() {
             let found = internal::add_forces(subdomain, &self.materials[own], &u[own], &mut forces[own]);
-            partial.extend([found.energy, dot(&self.loads[own], &u[own]), found.plastic as f64]);
+            let Terms { energy, force_squares } = found.terms;
+            let work = dot(&self.loads[own], &u[own]);
+            partial.extend([found.energy, work, found.plastic as f64, energy, force_squares]);
         }
-        let sum = self.space.sum(&partial, 3);
+        let sum = self.space.sum(&partial, 5);
         State {
             forces,
             energy: sum[0] - sum[1],
             internal_energy: sum[0],
             external_work: sum[1],
             plastic: sum[2] as usize,
+            terms: Terms { energy: sum[3], force_squares: sum[4] },
         }
     }
 
@@ -88,15 +97,16 @@ impl TornProblem<'_> {
         self.space.sum(&partial, 1)[0]
     }
 
-    /// The paper's stopping criterion `|v - u|_e / (|v|_e + |u|_e)`, zero if nothing moves at all.
-    pub fn relative_change(&self, u: &Torn, v: &Torn) -> f64 {
+    /// The paper's stopping criterion `|v - u|_e / (|v|_e + |u|_e)`, zero if nothing moves at all. `terms` are those at `v`.
+    pub fn relative_change(&self, u: &Torn, v: &Torn, terms: &Terms) -> f64 {
         let mut partial = Vec::with_capacity(3 * u.len());
         for (own, subdomain) in self.subdomains.iter().enumerate() {
             let difference: Vec<f64> = v[own].iter().zip(&u[own]).map(|(v, u)| v - u).collect();
             partial.extend(internal::elastic_squares(subdomain, &self.materials[own], [&difference, &u[own], &v[own]]));
         }
         let norms: Vec<f64> = self.space.sum(&partial, 3).into_iter().map(f64::sqrt).collect();
-        if norms[0] == 0.0 { 0.0 } else { norms[0] / (norms[1] + norms[2]) }
+        let size = (norms[1] + norms[2]).max(SIGNIFICANT * terms.energy.sqrt());
+        if norms[0] == 0.0 { 0.0 } else { norms[0] / size }
     }
 
     /// `c - B u`: what is left until each constraint holds. One neighbour exchange.

@@ -3,14 +3,15 @@
 //! With `v = f - F(u) - B_I'lambda_I` and the copies of each node added up, equilibrium asks that what is left at the
 //! unsupported components is zero. Nothing of the dual solver's recurrences is used.
 
-use super::problem::{State, TornProblem};
+use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::constraint::Kind;
 use crate::feti::Torn;
 
 /// Relative residuals; all are zero for the exact solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residuals {
-    /// Euclidean norm of the unbalanced nodal forces over that of the applied or internal nodal forces.
+    /// Euclidean norm of the unbalanced nodal forces over that of the applied or internal nodal forces (or a hundred
+    /// millionth of the terms that these are sums of, where bodies move without strain).
     pub equilibrium: f64,
     /// Largest distance of a copy from its node's mean, or of a supported node from its prescribed value, over the
     /// largest displacement.
@@ -47,6 +48,8 @@ impl TornProblem<'_> {
         self.remove(&mut internal, |kind| kind == Kind::Gluing);
         let squares = self.glued_squares([&free, &applied, &internal]);
 
+        let terms = SIGNIFICANT * state.terms.force_squares.sqrt();
+
         let slack = self.slack(u);
         let mut worst = [0.0_f64; 5];
         for ((row, &s), &force) in self.constraints.rows.iter().zip(&slack).zip(lambda) {
@@ -63,7 +66,7 @@ impl TornProblem<'_> {
         worst[4] = largest_displacement(u);
         let [glue, gap, product, force, size] = worst.map(|w| self.space.maximum(w));
         Residuals {
-            equilibrium: relative(squares[0].sqrt(), squares[1].max(squares[2]).sqrt()),
+            equilibrium: relative(squares[0].sqrt(), squares[1].max(squares[2]).sqrt().max(terms)),
             gluing: relative(glue, size),
             gap: relative(gap, size),
             complementarity: relative(product, force * size),

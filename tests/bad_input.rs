@@ -1,0 +1,191 @@
+//! Bad input: one message that names what is wrong and what is allowed, the right exit code, on 1 and on 2 ranks, and
+//! earlier results stay as they were.
+
+mod common;
+
+use std::fs;
+
+use common::{Run, run, scene_file};
+
+const USAGE: i32 = 64;
+const BAD_SCENE: i32 = 65;
+const INPUT_OUTPUT: i32 = 74;
+
+const EARLIER: &str = "earlier results";
+
+/// Fails unless the program says one thing, once, without a backtrace, that has all the parts.
+#[track_caller]
+fn assert_refused(run: &Run, code: i32, parts: &[&str]) {
+    let said = &run.stderr;
+    assert_eq!(run.code, code, "{said}");
+    let messages = said.lines().filter(|line| line.starts_with("fetiplast:") || line.starts_with("error:")).count();
+    assert_eq!(messages, 1, "{said}");
+    for part in parts {
+        assert!(said.contains(part), "nothing about `{part}` in: {said}");
+    }
+    for word in ["panicked", "backtrace", "Caused by"] {
+        assert!(!said.contains(word), "{said}");
+    }
+}
+
+/// Solves with these overrides, on 1 and 2 ranks, where results of that name exist already.
+#[track_caller]
+fn assert_scene_refused(scene: &str, sets: &[&str], code: i32, parts: &[&str]) {
+    for ranks in [1, 2] {
+        let out = tempfile::tempdir().unwrap();
+        let (result, summary) = (out.path().join("patch.vtkhdf"), out.path().join("patch.json"));
+        fs::write(&result, EARLIER).unwrap();
+        fs::write(&summary, EARLIER).unwrap();
+        let mut arguments = vec!["solve", scene, "--out", out.path().to_str().unwrap()];
+        arguments.extend(sets.iter().flat_map(|set| ["--set", set]));
+        assert_refused(&run(ranks, &arguments), code, parts);
+        assert_eq!(fs::read_to_string(&result).unwrap(), EARLIER);
+        assert_eq!(fs::read_to_string(&summary).unwrap(), EARLIER);
+        assert_eq!(fs::read_dir(out.path()).unwrap().count(), 2, "no other files appear");
+    }
+}
+
+#[track_caller]
+fn assert_override_refused(set: &str, parts: &[&str]) {
+    assert_scene_refused("patch", &[set], BAD_SCENE, parts);
+}
+
+/// The built-in scene `patch` as a file, with `from` replaced by `to`.
+#[track_caller]
+fn assert_text_refused(from: &str, to: &str, parts: &[&str]) {
+    let text = include_str!("../src/scene/library/patch.toml");
+    assert!(text.contains(from));
+    let directory = tempfile::tempdir().unwrap();
+    let file = scene_file(directory.path(), &text.replace(from, to));
+    assert_scene_refused(&file, &[], BAD_SCENE, parts);
+}
+
+#[test]
+fn an_unknown_key_is_named_with_its_place_and_the_known_ones() {
+    assert_text_refused("young =", "youg =", &["youg", "line 8", "young", "poisson", "yield_stress", "hardening"]);
+    assert_override_refused("solver.tolerance=1e-3", &["solver.tolerance=1e-3", "newton_tolerance", "qp_tolerance"]);
+}
+
+#[test]
+fn a_missing_material_is_named_with_the_known_ones() {
+    assert_override_refused("body.upper.material=wood", &["body.upper.material", "wood", "steel"]);
+    assert_text_refused("material = \"steel\"\n", "", &["material", "line 13"]);
+}
+
+#[test]
+fn an_incompressible_material_is_refused() {
+    for poisson in ["0.5", "nan"] {
+        let set = format!("material.steel.poisson={poisson}");
+        assert_override_refused(&set, &["material.steel.poisson", "below 0.5"]);
+    }
+}
+
+#[test]
+fn moduli_and_stresses_that_are_not_positive_and_finite_are_refused() {
+    assert_override_refused("material.steel.young=-210000", &["material.steel.young", "positive"]);
+    assert_override_refused("material.steel.young=nan", &["material.steel.young", "finite"]);
+    assert_override_refused("material.steel.hardening=nan", &["material.steel.hardening", "finite"]);
+}
+
+#[test]
+fn geometry_and_displacements_that_are_not_finite_are_refused() {
+    assert_override_refused("body.upper.brick.size.1=nan", &["body.upper.brick.size", "positive and finite"]);
+    assert_override_refused("support.top.displacement.2=nan", &["support.top.displacement", "finite"]);
+}
+
+#[test]
+fn a_load_that_is_not_finite_is_refused() {
+    let add = "[load.press]\nsurface = \"upper.zmax\"\ntraction = [0.0, 0.0, nan]\n[decomposition]";
+    assert_text_refused("[decomposition]", add, &["load.press.traction", "finite"]);
+}
+
+#[test]
+fn surfaces_that_do_not_exist_are_named() {
+    assert_override_refused("support.top.surface=upper.top", &["upper.top", "zmax"]);
+    assert_override_refused("contact.joint.slave=", &["contact.joint.slave="]);
+}
+
+#[test]
+fn surfaces_that_nowhere_face_each_other_are_no_contact() {
+    assert_override_refused("body.upper.brick.origin.0=5000", &["contact.joint", "opposite"]);
+    assert_override_refused("body.upper.brick.cells=[6, 4, 4]", &["contact.joint", "match"]);
+}
+
+#[test]
+fn a_body_that_nothing_holds_is_named_with_its_free_motions() {
+    let text = include_str!("../src/scene/library/bar.toml").replace("fix = [\"z\"]", "fix = [\"y\"]");
+    let directory = tempfile::tempdir().unwrap();
+    let file = scene_file(directory.path(), &text);
+    assert_scene_refused(&file, &[], BAD_SCENE, &["body.bar", "translation along z", "add supports"]);
+}
+
+#[test]
+fn a_subdomain_count_out_of_range_is_refused_with_the_range() {
+    assert_override_refused("decomposition.subdomains=1", &["decomposition.subdomains", "2 bodies"]);
+    assert_override_refused("decomposition.subdomains=769", &["decomposition.subdomains", "768 elements"]);
+    assert_override_refused("decomposition.cells=[3, 2, 2]", &["decomposition.cells", "divide", "along x"]);
+}
+
+#[test]
+fn bad_toml_is_shown_with_line_and_column() {
+    assert_text_refused("young = 210000.0", "young = = 210000.0", &["line 8, column"]);
+    assert_text_refused("young = 210000.0", "young = \"stiff\"", &["line 8, column", "stiff"]);
+}
+
+#[test]
+fn an_unknown_scene_is_told_the_known_ones() {
+    assert_scene_refused("two-bloks", &[], BAD_SCENE, &["two-bloks", "two-blocks", "patch", "TOML file"]);
+    assert_scene_refused("no/such/scene.toml", &[], INPUT_OUTPUT, &["no/such/scene.toml", "No such file"]);
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_refused_before_anything_is_solved() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("file");
+    fs::write(&file, EARLIER).unwrap();
+    for ranks in [1, 2] {
+        for out in [file.join("below").to_str().unwrap(), "/proc/fetiplast"] {
+            let refused = run(ranks, &["solve", "patch", "--out", out]);
+            assert_refused(&refused, INPUT_OUTPUT, &[out, "cannot write"]);
+            assert!(!refused.stdout.contains("criterion"), "nothing was solved: {}", refused.stdout);
+        }
+        let summary = file.join("summary.json");
+        let refused = run(ranks, &["check", "patch", "--summary", summary.to_str().unwrap()]);
+        assert_refused(&refused, INPUT_OUTPUT, &["summary.json", "cannot write"]);
+        assert_eq!(fs::read_to_string(&file).unwrap(), EARLIER);
+    }
+}
+
+#[test]
+fn a_wrong_command_line_is_a_usage_error() {
+    for ranks in [1, 2] {
+        assert_refused(&run(ranks, &["solve", "patch", "--fast"]), USAGE, &["--fast"]);
+        assert_refused(&run(ranks, &["slove"]), USAGE, &["slove"]);
+        assert_refused(&run(ranks, &["solve", "patch", "--level", "two"]), USAGE, &["--level", "two"]);
+        assert_refused(&run(ranks, &["show", "nothing"]), USAGE, &["nothing", "two-blocks"]);
+    }
+}
+
+/// A run that cannot converge says so and writes what it has.
+fn assert_outcome(set: &str, reason: &str) {
+    for ranks in [1, 2] {
+        let run = common::solve(ranks, "bar", &[set]);
+        assert_eq!(run.code, 1, "{}{}", run.stdout, run.stderr);
+        assert!(!run.stderr.contains("panicked"), "{}", run.stderr);
+        let summary = run.summary();
+        assert_eq!(summary["converged"], false);
+        let error = summary["error"].as_str().unwrap_or_default();
+        assert!(error.contains(reason), "{error}");
+        assert!(run.result().exists());
+    }
+}
+
+#[test]
+fn a_load_beyond_all_numbers_ends_as_an_outcome_with_results() {
+    assert_outcome("load.pull.traction.0=1e300", "not finite");
+}
+
+#[test]
+fn a_stiffness_beyond_all_numbers_ends_as_an_outcome_with_results() {
+    assert_outcome("material.steel.young=1e308", "stiffness matrix is not positive definite");
+}

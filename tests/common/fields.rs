@@ -1,0 +1,89 @@
+//! The mesh and the fields of a result file.
+
+use std::path::Path;
+
+use hdf5_metno::{Dataset, File};
+
+/// All pieces of a result file, one behind the other.
+pub struct Fields {
+    file: File,
+    pub points: Vec<[f64; 3]>,
+    pub displacement: Vec<[f64; 3]>,
+    /// Corners of the elements, as indices into the points.
+    pub elements: Vec<[usize; 4]>,
+}
+
+impl Fields {
+    pub fn read(path: &Path) -> Fields {
+        let file = File::open(path).unwrap();
+        let numbers = |name: &str| file.dataset(&format!("VTKHDF/{name}")).unwrap().read_raw::<i64>().unwrap();
+        let vectors = |name: &str| {
+            let raw = file.dataset(&format!("VTKHDF/{name}")).unwrap().read_raw::<f64>().unwrap();
+            raw.as_chunks::<3>().0.to_vec()
+        };
+        // Every piece counts its own points.
+        let mut connectivity = Vec::new();
+        let (mut first_point, mut rest) = (0, &numbers("Connectivity")[..]);
+        for (points, entries) in numbers("NumberOfPoints").into_iter().zip(numbers("NumberOfConnectivityIds")) {
+            let (mine, others) = rest.split_at(entries as usize);
+            connectivity.extend(mine.iter().map(|&point| (first_point + point) as usize));
+            (first_point, rest) = (first_point + points, others);
+        }
+        Fields {
+            points: vectors("Points"),
+            displacement: vectors("PointData/displacement"),
+            elements: connectivity.as_chunks::<4>().0.to_vec(),
+            file,
+        }
+    }
+
+    /// A field of one real number a point.
+    pub fn of_points(&self, name: &str) -> Vec<f64> {
+        self.file.dataset(&format!("VTKHDF/PointData/{name}")).unwrap().read_raw().unwrap()
+    }
+
+    /// A field of one real number an element.
+    pub fn of_elements(&self, name: &str) -> Vec<f64> {
+        self.file.dataset(&format!("VTKHDF/CellData/{name}")).unwrap().read_raw().unwrap()
+    }
+
+    /// A field of one integer an element.
+    pub fn integers_of_elements(&self, name: &str) -> Vec<i64> {
+        self.file.dataset(&format!("VTKHDF/CellData/{name}")).unwrap().read_raw().unwrap()
+    }
+
+    /// Body number of each point.
+    pub fn body_of_points(&self) -> Vec<i64> {
+        let mut bodies = vec![-1; self.points.len()];
+        for (element, body) in self.elements.iter().zip(self.integers_of_elements("body")) {
+            element.iter().for_each(|&point| bodies[point] = body);
+        }
+        bodies
+    }
+
+    /// Cells of each piece, one piece a rank.
+    pub fn cells_of_pieces(&self) -> Vec<i64> {
+        self.file.dataset("VTKHDF/NumberOfCells").unwrap().read_raw().unwrap()
+    }
+
+    /// The bits of every dataset of these groups, by name; integers and reals alike take 8 bytes.
+    pub fn bits(&self, groups: &[&str]) -> Vec<(String, Vec<u64>)> {
+        let mut all = Vec::new();
+        for group in groups {
+            for name in self.file.group(group).unwrap().member_names().unwrap() {
+                let path = format!("{group}/{name}");
+                let bits = bits(&self.file.dataset(&path).unwrap());
+                all.push((path, bits));
+            }
+        }
+        all
+    }
+}
+
+fn bits(dataset: &Dataset) -> Vec<u64> {
+    if dataset.dtype().unwrap().is::<i64>() {
+        dataset.read_raw::<i64>().unwrap().into_iter().map(i64::cast_unsigned).collect()
+    } else {
+        dataset.read_raw::<f64>().unwrap().into_iter().map(f64::to_bits).collect()
+    }
+}

@@ -1,0 +1,181 @@
+//! Runs the program as a user would, under `mpirun` for more than one rank, with a time limit, and reads back what it
+//! wrote.
+
+#![allow(dead_code, reason = "every test binary compiles this module and uses part of it")]
+
+pub mod fields;
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus};
+use std::sync::{Mutex, PoisonError};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// One run at a time: ranks wait busily, and two runs on two cores would each wait for the other.
+static TURN: Mutex<()> = Mutex::new(());
+
+const TIME_LIMIT: Duration = Duration::from_secs(240);
+
+/// How a run ended and what it said. Its files vanish with it.
+pub struct Run {
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+    directory: TempDir,
+}
+
+impl Run {
+    /// The summary that it wrote.
+    pub fn summary(&self) -> Value {
+        let path = self.directory.path().join(SUMMARY);
+        let text = fs::read_to_string(&path)
+            .unwrap_or_else(|error| panic!("no summary: {error}; exit code {}: {}", self.code, self.stderr));
+        serde_json::from_str(&text).expect("the summary is JSON")
+    }
+
+    /// The result file that it wrote.
+    pub fn result(&self) -> PathBuf {
+        let files = fs::read_dir(self.directory.path()).unwrap().map(|entry| entry.unwrap().path());
+        let mut results = files.filter(|path| path.extension().is_some_and(|extension| extension == "vtkhdf"));
+        results.next().unwrap_or_else(|| panic!("no result file; exit code {}: {}", self.code, self.stderr))
+    }
+
+    /// Passes on a run that converged.
+    pub fn converged(self) -> Run {
+        assert_eq!(self.code, 0, "{}{}", self.stdout, self.stderr);
+        assert_eq!(self.summary()["converged"], true);
+        self
+    }
+}
+
+const SUMMARY: &str = "summary.json";
+
+/// Solves a built-in scene or scene file, with each of `sets` as a `--set`.
+pub fn solve(ranks: usize, scene: &str, sets: &[&str]) -> Run {
+    solve_level(ranks, scene, 1, sets)
+}
+
+/// As [`solve`], refined.
+pub fn solve_level(ranks: usize, scene: &str, level: usize, sets: &[&str]) -> Run {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().to_str().unwrap().to_owned();
+    scene_command("solve", ranks, scene, level, sets, &["--progress", "off", "--out", &out], directory)
+}
+
+/// Checks a scene without solving it.
+pub fn check(ranks: usize, scene: &str, level: usize, sets: &[&str]) -> Run {
+    scene_command("check", ranks, scene, level, sets, &[], tempfile::tempdir().unwrap())
+}
+
+fn scene_command(
+    command: &str,
+    ranks: usize,
+    scene: &str,
+    level: usize,
+    sets: &[&str],
+    more: &[&str],
+    directory: TempDir,
+) -> Run {
+    let (level, summary) = (level.to_string(), directory.path().join(SUMMARY));
+    let mut arguments = vec![command, scene, "--level", &level, "--summary", summary.to_str().unwrap()];
+    arguments.extend(more);
+    arguments.extend(sets.iter().flat_map(|set| ["--set", set]));
+    launch(ranks, &arguments, directory)
+}
+
+/// Runs the program with these arguments.
+pub fn run(ranks: usize, arguments: &[&str]) -> Run {
+    launch(ranks, arguments, tempfile::tempdir().unwrap())
+}
+
+/// Writes a scene file of this text to a directory.
+pub fn scene_file(directory: &Path, text: &str) -> String {
+    let path = directory.join("scene.toml");
+    fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+fn launch(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
+    // A failed test poisons the lock, which guards no data.
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let program = env!("CARGO_BIN_EXE_fetiplast");
+    let mut command = if ranks == 1 { Command::new(program) } else { Command::new("mpirun") };
+    if ranks > 1 {
+        command.args(["-np", &ranks.to_string(), program]);
+    }
+    command.args(arguments);
+    command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+    command.env("OMPI_MCA_rmaps_base_oversubscribe", "1").env("RUST_BACKTRACE", "1");
+    if ranks > 2 {
+        command.env("OMPI_MCA_mpi_yield_when_idle", "1");
+    }
+    // Files, unlike pipes, never fill up.
+    let streams = ["stdout", "stderr"].map(|name| directory.path().join(name));
+    command.stdout(File::create(&streams[0]).unwrap()).stderr(File::create(&streams[1]).unwrap());
+    let status = wait(command);
+    let [stdout, stderr] = streams.map(|path| fs::read_to_string(path).unwrap());
+    let code = status.code().unwrap_or_else(|| panic!("{status}: {stderr}"));
+    Run { code, stdout, stderr, directory }
+}
+
+/// The end of a command, which is killed and a failure of the test if it does not come in time.
+fn wait(mut command: Command) -> ExitStatus {
+    let mut child = command.spawn().expect("the program can be started");
+    let start = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        if start.elapsed() > TIME_LIMIT {
+            // On SIGTERM mpirun ends its ranks too.
+            Command::new("kill").arg(child.id().to_string()).status().unwrap();
+            sleep(Duration::from_secs(5));
+            child.kill().unwrap();
+            child.wait().unwrap();
+            panic!("no end after {TIME_LIMIT:?}: {command:?}");
+        }
+        sleep(Duration::from_millis(10));
+    }
+}
+
+/// The number under this key.
+pub fn number(summary: &Value, key: &str) -> f64 {
+    summary[key].as_f64().unwrap_or_else(|| panic!("{key} is no number in {summary:#}"))
+}
+
+/// The vector under this key.
+pub fn vector(value: &Value) -> [f64; 3] {
+    serde_json::from_value(value.clone()).unwrap_or_else(|error| panic!("{value} is no vector: {error}"))
+}
+
+/// Euclidean norm of `a - b`.
+pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Fails unless `found` is `expected` to a relative tolerance.
+#[track_caller]
+pub fn assert_close(what: &str, found: f64, expected: f64, tolerance: f64) {
+    let error = (found - expected).abs() / expected.abs();
+    assert!(error <= tolerance, "{what}: {found} instead of {expected}, relative error {error:.2e}");
+}
+
+/// Fails unless a vector is `expected` to a tolerance relative to its length.
+#[track_caller]
+pub fn assert_near(what: &str, found: [f64; 3], expected: [f64; 3], tolerance: f64) {
+    let error = distance(found, expected) / distance(expected, [0.0; 3]);
+    assert!(error <= tolerance, "{what}: {found:?} instead of {expected:?}, relative error {error:.2e}");
+}
+
+/// Fails if one of the residuals of the glued problem is above the bound.
+#[track_caller]
+pub fn assert_residuals(summary: &Value, bound: f64) {
+    for key in ["residual_equilibrium", "residual_gluing", "residual_gap", "residual_complementarity"] {
+        let residual = number(summary, key);
+        assert!(residual <= bound, "{key} is {residual:.2e}");
+    }
+}

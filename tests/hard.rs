@@ -1,0 +1,148 @@
+//! Scenes that are hard for the method: near incompressibility, perfect plasticity, jumps of stiffness, degenerate
+//! contact, bodies that only contact holds, decompositions into shreds or into whole bodies.
+
+mod common;
+
+use common::{Run, assert_close, assert_near, assert_residuals, number, scene_file, solve, vector};
+use serde_json::Value;
+
+const RANKS: usize = 2;
+
+/// The benchmark with cells twice as large.
+const COARSE: [&str; 3] =
+    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
+
+/// Newton steps and applications of F in which every scene here must be solved.
+const MOST_STEPS: f64 = 15.0;
+const MOST_MULTIPLICATIONS: f64 = 3000.0;
+
+/// Fails unless the run converged, well, in a reasonable time, and forces balance.
+#[track_caller]
+fn assert_solved(run: Run) -> Value {
+    let summary = run.converged().summary();
+    assert_residuals(&summary, 1e-6);
+    for (key, most) in [("newton_iterations", MOST_STEPS), ("hessian_multiplications", MOST_MULTIPLICATIONS)] {
+        let count = number(&summary, key);
+        assert!(count <= most, "{key} is {count}");
+    }
+    summary
+}
+
+fn coarse(sets: &[&str]) -> Value {
+    assert_solved(solve(RANKS, "two-blocks", &[&COARSE[..], sets].concat()))
+}
+
+/// The supports carry the load of the benchmark.
+#[track_caller]
+fn assert_balance(summary: &Value, load: f64) {
+    let [left, right] = ["left", "right"].map(|support| vector(&summary["reactions"][support]));
+    let sum = std::array::from_fn(|axis| left[axis] + right[axis]);
+    assert_near("reactions", sum, [0.0, 0.0, load], 1e-5);
+}
+
+#[test]
+fn nearly_incompressible_bodies_converge() {
+    let summary = coarse(&["material.lower.poisson=0.499", "material.upper.poisson=0.499"]);
+    assert_balance(&summary, 4.5e8);
+    assert!(number(&summary, "plastic_elements") > 0.0);
+}
+
+#[test]
+fn almost_perfect_plasticity_below_collapse_converges() {
+    let summary =
+        coarse(&["material.lower.hardening=0.21", "material.upper.hardening=0.21", "load.top.traction.2=-100"]);
+    assert_balance(&summary, 3e8);
+    assert!(number(&summary, "plastic_elements") > 0.0);
+    // The yield surface grows by next to nothing.
+    assert_close("largest stress", number(&summary, "max_von_mises"), 450.0, 1e-4);
+}
+
+#[test]
+fn a_million_times_stiffer_body_converges_with_scaling() {
+    for stiff in ["material.upper.young=2.1e11", "material.lower.young=2.1e11"] {
+        let summary = coarse(&[stiff, "load.top.traction.2=-30", "solver.preconditioner=lumped"]);
+        assert_balance(&summary, 9e7);
+    }
+}
+
+#[test]
+fn the_decomposition_changes_nothing_where_the_contact_edge_meets_subdomain_corners() {
+    let tight = ["solver.newton_tolerance=1e-7", "solver.residual_tolerance=1e-8", "solver.qp_tolerance=1e-9"];
+    // The upper body begins at the third cell of the lower one: its edge lies on faces and corners of the cubes of 3
+    // cells' length, and inside those of 5.
+    let solved = |cells: &str| {
+        let decomposition = format!("decomposition.cells={cells}");
+        assert_solved(solve(RANKS, "two-blocks", &[&COARSE[..2], &tight, &[&decomposition]].concat()))
+    };
+    let (on, inside) = (solved("[3, 5, 5]"), solved("[5, 5, 5]"));
+    assert_ne!(on["subdomains"], inside["subdomains"]);
+    for key in ["plastic_elements", "active_contacts"] {
+        assert_eq!(on[key], inside[key], "{key}");
+    }
+    for key in ["energy", "max_displacement", "max_von_mises"] {
+        assert_close(key, number(&on, key), number(&inside, key), 1e-6);
+    }
+}
+
+#[test]
+fn one_subdomain_per_body_needs_no_gluing() {
+    let summary =
+        assert_solved(solve(RANKS, "two-blocks", &[&COARSE[..2], &["decomposition.cells=[15, 5, 5]"]].concat()));
+    assert_eq!(summary["subdomains"], 2);
+    assert_eq!(summary["gluing_rows"], 0);
+    assert_balance(&summary, 4.5e8);
+}
+
+#[test]
+fn ragged_parts_of_two_elements_carry_the_contact_patch() {
+    let summary = assert_solved(solve(RANKS, "patch", &["decomposition.subdomains=384"]));
+    assert!(number(&summary, "subdomains") >= 384.0, "a part is split, never merged");
+    assert_close("contact force", vector(&summary["contact_force"])[2], 315e6, 1e-5);
+    assert_close("largest stress", number(&summary, "max_von_mises"), 315.0, 1e-4);
+}
+
+/// A gap of zero that no force closes: the load pulls the lower body down, away from the upper one.
+#[test]
+fn contact_that_opens_everywhere_transmits_no_force() {
+    let summary =
+        assert_solved(solve(RANKS, "two-blocks-elastic", &[&COARSE[..], &["load.top.surface=lower.zmax"]].concat()));
+    assert_eq!(summary["active_contacts"], 0);
+    assert_eq!(vector(&summary["contact_force"]), [0.0; 3]);
+    assert_near("reaction", vector(&summary["reactions"]["left"]), [0.0, 0.0, 9e7], 1e-5);
+}
+
+/// The contact patch with a load on the upper block instead of its support: only contact holds it vertically.
+fn pressed(traction: f64, sets: &[&str]) -> Run {
+    let text = include_str!("../src/scene/library/patch.toml");
+    let support = "[support.top]\nsurface = \"upper.zmax\"\nfix = [\"z\"]\ndisplacement = [0.0, 0.0, -3.0]\n";
+    assert!(text.contains(support));
+    let load = format!("[load.top]\nsurface = \"upper.zmax\"\ntraction = [0.0, 0.0, {traction:?}]\n");
+    let directory = tempfile::tempdir().unwrap();
+    solve(RANKS, &scene_file(directory.path(), &text.replace(support, &load)), sets)
+}
+
+#[test]
+fn a_body_that_only_contact_holds_is_warned_of_and_carried() {
+    for gap in [0.0, 5.0] {
+        let origin = format!("body.upper.brick.origin.2={}", 1000.0 + gap);
+        let summary = assert_solved(pressed(-315.0, &[&origin]));
+        let warnings = summary["warnings"].to_string();
+        assert!(warnings.contains("body upper") && warnings.contains("only contact can hold"), "{warnings}");
+        assert_close("contact force", vector(&summary["contact_force"])[2], 315e6, 1e-6);
+        assert_eq!(summary["active_contacts"], 25);
+        assert_close("largest stress", number(&summary, "max_von_mises"), 315.0, 1e-5);
+        let expected = 3.0 + gap;
+        let along_z = (number(&summary, "max_displacement").powi(2) - 2.0 * (0.29 * 1.5_f64).powi(2)).sqrt();
+        assert_close("largest displacement", along_z, expected, 1e-5);
+    }
+}
+
+#[test]
+fn a_body_that_is_pulled_off_its_only_hold_ends_as_an_outcome() {
+    let run = pressed(315.0, &[]);
+    assert_eq!(run.code, 1, "{}{}", run.stdout, run.stderr);
+    assert!(!run.stderr.contains("panicked"), "{}", run.stderr);
+    let summary = run.summary();
+    assert_eq!(summary["converged"], false);
+    assert!(summary["error"].is_string(), "{}", summary["error"]);
+}

@@ -1,0 +1,187 @@
+//! Homogeneous states, which linear elements hold exactly on any mesh: uniaxial tension, pure shear, and two blocks in
+//! contact, in several subdomains on 2 ranks. Expected values are closed forms: the tensor of strain is
+//! `sigma/E + kappa` along a uniaxial stress and `-nu sigma/E - kappa/2` across it, `kappa = (q - sigma_y)/H`.
+
+mod common;
+
+use common::fields::Fields;
+use common::{Run, assert_close, number, solve, vector};
+
+const YOUNG: f64 = 210_000.0;
+const POISSON: f64 = 0.29;
+const YIELD: f64 = 450.0;
+const HARDENING: f64 = 10_000.0;
+
+const RANKS: usize = 2;
+const EXACT: f64 = 1e-9;
+const TIGHT: [&str; 3] =
+    ["solver.newton_tolerance=1e-11", "solver.residual_tolerance=1e-11", "solver.qp_tolerance=1e-13"];
+
+fn tightly(scene: &str, sets: &[&str]) -> Run {
+    solve(RANKS, scene, &[&TIGHT[..], sets].concat()).converged()
+}
+
+/// Strains along and across a uniaxial stress, and the equivalent plastic strain.
+fn uniaxial(stress: f64) -> (f64, f64, f64) {
+    let plastic = (stress.abs() - YIELD).max(0.0) / HARDENING;
+    let kappa = plastic * stress.signum();
+    (stress / YOUNG + kappa, -POISSON * stress / YOUNG - kappa / 2.0, plastic)
+}
+
+/// Fails unless every value is the expected one, relative to `scale`.
+#[track_caller]
+fn assert_uniform(what: &str, values: impl IntoIterator<Item = f64>, expected: f64, scale: f64) {
+    let errors = values.into_iter().map(|value| ((value - expected) / scale).abs());
+    let worst = errors.fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a });
+    assert!(worst <= EXACT, "{what}: relative error {worst:.2e} against {expected}");
+}
+
+/// Fails unless every node has the displacement that `exact` gives for it.
+#[track_caller]
+fn assert_displacement(fields: &Fields, exact: impl Fn(usize) -> [f64; 3]) {
+    let expected: Vec<[f64; 3]> = (0..fields.points.len()).map(exact).collect();
+    let size = expected.as_flattened().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+    for axis in 0..3 {
+        let errors = fields.displacement.iter().zip(&expected).map(|(u, exact)| u[axis] - exact[axis]);
+        assert_uniform(&format!("displacement along axis {axis}"), errors, 0.0, size);
+    }
+}
+
+#[track_caller]
+fn assert_state(fields: &Fields, stress: f64, kappa: f64) {
+    assert_uniform("von Mises stress", fields.of_elements("von_mises"), stress, stress);
+    let size = if kappa > 0.0 { kappa } else { 1.0 };
+    assert_uniform("equivalent plastic strain", fields.of_elements("equivalent_plastic_strain"), kappa, size);
+}
+
+fn assert_bar(stress: f64, sets: &[&str]) {
+    let run = tightly("bar", sets);
+    let fields = Fields::read(&run.result());
+    let (along, across, kappa) = uniaxial(stress);
+    assert_displacement(&fields, |node| {
+        let [x, y, z] = fields.points[node];
+        [along * x, across * y, across * z]
+    });
+    assert_state(&fields, stress, kappa);
+    let summary = run.summary();
+    assert_close("reaction", vector(&summary["reactions"]["back"])[0], -stress * 500.0 * 500.0, EXACT);
+    assert_eq!(summary["plastic_fraction"], f64::from(stress > YIELD));
+}
+
+#[test]
+fn a_bar_stretches_by_the_closed_form_below_and_beyond_yield() {
+    assert_bar(400.0, &["load.pull.traction.0=400"]);
+    assert_bar(500.0, &[]);
+    assert_bar(600.0, &["load.pull.traction.0=600"]);
+    // The numbers themselves, in case the formula above is wrong.
+    let (along, across, _) = uniaxial(600.0);
+    assert_close("strain along", along, 1.785714285714e-2, 1e-12);
+    assert_close("strain across", across, -8.328571428571e-3, 1e-12);
+}
+
+#[test]
+fn a_bar_in_one_subdomain_or_many_stretches_the_same() {
+    assert_bar(500.0, &["decomposition.cells=[4, 2, 2]"]);
+    assert_bar(500.0, &["decomposition.cells=[1, 1, 1]"]);
+    assert_bar(500.0, &["decomposition.subdomains=7"]);
+}
+
+#[test]
+fn pure_shear_beyond_yield_is_the_closed_form() {
+    let run = tightly("shear", &[]);
+    let fields = Fields::read(&run.result());
+    let gamma = 1.574342794511e-2;
+    assert_close("angle", 15.74342794511481 / 1000.0, gamma, 1e-12);
+    assert_displacement(&fields, |node| [15.74342794511481 / 1000.0 * fields.points[node][1], 0.0, 0.0]);
+    let equivalent = 3.0_f64.sqrt() * 300.0;
+    assert_state(&fields, equivalent, (equivalent - YIELD) / HARDENING);
+    assert_close("reaction", vector(&run.summary()["reactions"]["top"])[0], 300.0 * 1e6, EXACT);
+}
+
+/// Two blocks of height 1000, `gap` apart, the top pushed down by `push`: both carry `-stress`.
+fn assert_blocks(push: f64, gap: f64, stress: f64, sets: &[&str]) {
+    let (displacement, origin) =
+        (format!("support.top.displacement.2={}", -push), format!("body.upper.brick.origin.2={}", 1000.0 + gap));
+    let run = tightly("patch", &[&[displacement.as_str(), &origin], sets].concat());
+    let fields = Fields::read(&run.result());
+    let bodies = fields.body_of_points();
+    let (along, across, kappa) = uniaxial(-stress);
+    assert_displacement(&fields, |node| {
+        let [x, y, z] = fields.points[node];
+        let down = if bodies[node] == 0 { along * z } else { along * (z - 2000.0 - gap) - push };
+        [across * x, across * y, down]
+    });
+    assert_state(&fields, stress, kappa);
+
+    let (pressure, distance) = (fields.of_points("contact_pressure"), fields.of_points("contact_gap"));
+    let slaves: Vec<usize> = (0..bodies.len()).filter(|&node| distance[node].is_finite()).collect();
+    let on_slave = |node: &usize| bodies[*node] == 1 && fields.points[*node][2] == 1000.0 + gap;
+    assert!(slaves.iter().all(on_slave) && slaves.len() >= 25, "{} slave nodes", slaves.len());
+    assert_uniform("contact pressure", slaves.iter().map(|&node| pressure[node]), stress, stress);
+    assert_uniform("gap", slaves.iter().map(|&node| distance[node]), 0.0, push);
+
+    let summary = run.summary();
+    let force = stress * 1e6;
+    assert_eq!(summary["active_contacts"], 25);
+    assert_close("contact force", vector(&summary["contact_force"])[2], force, EXACT);
+    assert_close("reaction of the bottom", vector(&summary["reactions"]["bottom"])[2], force, EXACT);
+    assert_close("reaction of the top", vector(&summary["reactions"]["top"])[2], -force, EXACT);
+}
+
+#[test]
+fn two_elastic_blocks_share_the_push() {
+    assert_blocks(3.0, 0.0, 315.0, &[]);
+    assert_blocks(3.0, 0.0, 315.0, &["solver.qp=active-set"]);
+}
+
+#[test]
+fn two_yielding_blocks_share_the_push() {
+    assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[]);
+}
+
+#[test]
+fn a_gap_takes_its_part_of_the_push() {
+    assert_blocks(10.0, 1.0, 472.5, &[]);
+    assert_blocks(10.0, 1.0, 472.5, &["solver.qp=active-set"]);
+}
+
+#[test]
+fn push_and_gap_shifted_alike_give_the_same_stress() {
+    assert_blocks(3.0 + 0.75, 0.75, 315.0, &[]);
+}
+
+#[test]
+fn blocks_cut_by_metis_or_solved_with_a_preconditioner_share_the_push_alike() {
+    assert_blocks(10.0, 1.0, 472.5, &["decomposition.subdomains=9"]);
+    assert_blocks(10.0, 1.0, 472.5, &["solver.preconditioner=lumped"]);
+    assert_blocks(10.0, 1.0, 472.5, &["solver.preconditioner=dirichlet"]);
+}
+
+/// Both blocks are free of stress: the lower one rests, the upper one has moved by `push` and is `left` above it.
+fn assert_apart(push: f64, gap: f64, left: f64) {
+    let (displacement, origin) =
+        (format!("support.top.displacement.2={}", -push), format!("body.upper.brick.origin.2={}", 1000.0 + gap));
+    let run = solve(RANKS, "patch", &[&displacement, &origin]).converged();
+    let fields = Fields::read(&run.result());
+    let bodies = fields.body_of_points();
+    assert_displacement(&fields, |node| [0.0, 0.0, if bodies[node] == 0 { 0.0 } else { -push }]);
+    // Relative to the stress that the same push gives without a gap.
+    let stress = YOUNG * push / 2000.0;
+    assert_uniform("von Mises stress", fields.of_elements("von_mises"), 0.0, stress);
+    assert_uniform("contact pressure", fields.of_points("contact_pressure"), 0.0, stress);
+    let distance = fields.of_points("contact_gap");
+    assert_uniform("gap", distance.into_iter().filter(|distance| distance.is_finite()), left, push);
+    let summary = run.summary();
+    assert!(number(&summary, "energy").abs() <= EXACT * stress * push * 1e6, "energy {}", summary["energy"]);
+    assert_eq!(summary["plastic_elements"], 0);
+}
+
+#[test]
+fn blocks_that_stay_apart_are_free_of_stress() {
+    assert_apart(1.0, 3.0, 2.0);
+}
+
+#[test]
+fn blocks_that_just_touch_are_free_of_stress() {
+    assert_apart(3.0, 3.0, 0.0);
+}

@@ -1,0 +1,91 @@
+//! The same scene gives bitwise the same summary and fields for every number of ranks: subdomains belong to the scene,
+//! and sums are formed in their order. Ranks beyond the number of subdomains stay idle.
+
+mod common;
+
+use common::fields::Fields;
+use common::{Run, solve};
+use serde_json::{Map, Value};
+
+const RANKS: [usize; 4] = [1, 2, 3, 5];
+
+/// The benchmark with cells twice as large, which plastic flow, contact and all six subdomains survive.
+const COARSE: [&str; 3] =
+    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
+
+/// Keys of the summary that may depend on the number of ranks or on the clock.
+const OF_THE_RUN: [&str; 5] = ["ranks", "time", "time_total", "peak_rss_mb", "warnings"];
+
+/// The summary but for what belongs to the run.
+fn result(run: &Run) -> Map<String, Value> {
+    let Value::Object(mut summary) = run.summary() else { panic!("the summary is an object") };
+    for key in OF_THE_RUN {
+        assert!(summary.remove(key).is_some(), "no key {key}");
+    }
+    for step in summary["newton"].as_array_mut().unwrap() {
+        assert!(step.as_object_mut().unwrap().remove("seconds").is_some());
+    }
+    summary
+}
+
+/// Fails unless all runs have the same results to the last bit; returns the number of subdomains.
+fn assert_independent_of_ranks(scene: &str, sets: &[&str], all_ranks: &[usize]) -> u64 {
+    let mut first = None;
+    let mut subdomains = 0;
+    for &ranks in all_ranks {
+        let run = solve(ranks, scene, sets).converged();
+        let summary = result(&run);
+        subdomains = summary["subdomains"].as_u64().unwrap();
+        let fields = Fields::read(&run.result());
+        assert_eq!(fields.cells_of_pieces().len(), ranks, "one piece a rank");
+        let mut bits = fields.bits(&["VTKHDF/PointData", "VTKHDF/CellData", "convergence"]);
+        assert!(bits.len() > 10 && bits.iter().all(|(_, column)| !column.is_empty()), "no fields");
+        let owners = bits.iter().position(|(name, _)| name == "VTKHDF/CellData/rank").expect("a field `rank`");
+        let (_, owners) = bits.swap_remove(owners);
+        assert_eq!(owners.iter().max(), Some(&(ranks.min(subdomains as usize) as u64 - 1)), "every rank has its share");
+        bits.sort();
+        let points: Vec<_> = fields.points.iter().map(|point| point.map(f64::to_bits)).collect();
+        let (summary_1, bits_1, points_1, elements_1) =
+            first.get_or_insert_with(|| (summary.clone(), bits.clone(), points.clone(), fields.elements.clone()));
+        for (key, value) in &summary {
+            assert_eq!(*value, summary_1[key], "{key} on {ranks} ranks");
+        }
+        assert_eq!(summary.len(), summary_1.len());
+        for ((name, column), (name_1, column_1)) in bits.iter().zip(bits_1) {
+            assert!(name == name_1 && column == column_1, "{name} differs on {ranks} ranks");
+        }
+        assert!(points == *points_1 && fields.elements == *elements_1, "another mesh on {ranks} ranks");
+    }
+    subdomains
+}
+
+#[test]
+fn bricks_give_the_same_bits_on_1_2_3_and_5_ranks() {
+    assert_eq!(assert_independent_of_ranks("two-blocks", &COARSE, &RANKS), 6);
+}
+
+#[test]
+fn metis_parts_give_the_same_bits_on_1_2_3_and_5_ranks() {
+    let sets = [&COARSE[..2], &["decomposition.method=metis", "decomposition.subdomains=7"]].concat();
+    assert!(assert_independent_of_ranks("two-blocks", &sets, &RANKS) >= 7);
+}
+
+#[test]
+fn preconditioned_active_sets_give_the_same_bits_on_1_2_3_and_5_ranks() {
+    let sets = [&COARSE[..], &["solver.qp=active-set", "solver.preconditioner=dirichlet"]].concat();
+    assert_eq!(assert_independent_of_ranks("two-blocks", &sets, &RANKS), 6);
+}
+
+#[test]
+fn ranks_without_a_subdomain_stay_idle_and_change_nothing() {
+    let sets = [&COARSE[..2], &["decomposition.cells=[15, 5, 5]"]].concat();
+    assert_eq!(assert_independent_of_ranks("two-blocks", &sets, &[1, 3, 5]), 2);
+    let warned = |ranks| solve(ranks, "bar", &[]).converged().summary()["warnings"].to_string();
+    assert!(warned(3).contains("1 of 3 ranks stay idle: there are only 2 subdomains"));
+    assert_eq!(warned(2), "[]");
+}
+
+#[test]
+fn a_scene_without_contact_gives_the_same_bits_on_1_2_3_and_5_ranks() {
+    assert_eq!(assert_independent_of_ranks("shear", &[], &RANKS), 8);
+}

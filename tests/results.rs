@@ -1,0 +1,167 @@
+//! What a run leaves behind: a result file that other programs read, and a summary with the keys that scripts rely on.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use common::fields::Fields;
+use common::{Run, check, solve};
+use serde_json::Value;
+
+fn can_read(python: &Path) -> bool {
+    Command::new(python).args(["-c", "import h5py, vtk"]).output().is_ok_and(|output| output.status.success())
+}
+
+/// A Python with h5py and VTK: the one of `scripts/setup --python`, or the system's.
+fn python() -> PathBuf {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join(".venv/bin/python");
+    [own, PathBuf::from("python3")]
+        .into_iter()
+        .find(|python| can_read(python))
+        .expect("no Python with h5py and vtk: run scripts/setup --python")
+}
+
+fn assert_reads_back(run: &Run) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/read_back.py");
+    let output = Command::new(python()).arg(script).arg(run.result()).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    assert!(text(&output.stdout).contains("every value equal"), "{}", text(&output.stdout));
+}
+
+#[test]
+fn a_result_of_two_ranks_is_read_back_by_h5py_and_vtk() {
+    assert_reads_back(&solve(2, "patch", &["support.top.displacement.2=-10"]).converged());
+}
+
+#[test]
+fn a_result_with_an_empty_piece_is_read_back_by_h5py_and_vtk() {
+    let run = solve(3, "bar", &[]).converged();
+    let mut cells = Fields::read(&run.result()).cells_of_pieces();
+    cells.sort_unstable();
+    assert_eq!(cells, [0, 48, 48]);
+    assert_reads_back(&run);
+}
+
+/// Keys of a solved scene with contact and plastic material, by type.
+const NUMBERS: [&str; 12] = [
+    "plastic_fraction",
+    "external_work",
+    "internal_energy",
+    "energy",
+    "max_displacement",
+    "max_von_mises",
+    "residual_equilibrium",
+    "residual_gluing",
+    "residual_gap",
+    "residual_complementarity",
+    "time_total",
+    "peak_rss_mb",
+];
+const COUNTS: [&str; 18] = [
+    "level",
+    "ranks",
+    "nodes",
+    "cells",
+    "elements",
+    "subdomains",
+    "primal_dofs",
+    "dual_dofs",
+    "gluing_rows",
+    "dirichlet_rows",
+    "contact_rows",
+    "plastic_elements",
+    "newton_iterations",
+    "dual_iterations",
+    "hessian_multiplications",
+    "preconditioner_applications",
+    "factorisations",
+    "active_contacts",
+];
+
+#[test]
+fn the_summary_has_every_key_of_the_contract() {
+    for (qp, own, other) in [
+        ("smalse-m", "smalse_iterations", "active_set_iterations"),
+        ("active-set", "active_set_iterations", "smalse_iterations"),
+    ] {
+        let set = format!("solver.qp={qp}");
+        let summary = solve(2, "patch", &["support.top.displacement.2=-10", &set]).converged().summary();
+        assert_contract(&summary);
+        assert_eq!(summary["qp"], qp);
+        assert!(summary[own].is_u64(), "{own}: {}", summary[own]);
+        assert!(summary.as_object().unwrap().contains_key(other));
+        assert_eq!(summary[other], Value::Null, "this is the other solver");
+    }
+}
+
+fn assert_contract(summary: &Value) {
+    for key in NUMBERS {
+        assert!(summary[key].is_number(), "{key}: {}", summary[key]);
+    }
+    for key in COUNTS {
+        assert!(summary[key].is_u64(), "{key}: {}", summary[key]);
+    }
+    assert_eq!(summary["scene"], "patch");
+    assert_eq!(summary["error"], Value::Null);
+    assert_eq!((&summary["level"], &summary["ranks"]), (&1.into(), &2.into()));
+    common::vector(&summary["contact_force"]);
+    let reactions = summary["reactions"].as_object().unwrap();
+    let supports: Vec<&String> = reactions.keys().collect();
+    assert_eq!(supports, ["bottom", "lower-back", "lower-side", "top", "upper-back", "upper-side"]);
+    reactions.values().for_each(|reaction| {
+        common::vector(reaction);
+    });
+    let time = summary["time"].as_object().unwrap();
+    assert!(time.len() > 3 && time.values().all(Value::is_number), "{time:?}");
+}
+
+#[test]
+fn the_summary_of_a_check_has_the_same_keys_and_nulls_for_what_was_not_computed() {
+    let (solved, checked) = (solve(2, "patch", &[]).converged().summary(), check(2, "patch", 1, &[]).summary());
+    let keys = |summary: &Value| summary.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    assert_eq!(keys(&checked), keys(&solved));
+    for key in ["converged", "energy", "newton_iterations", "residual_equilibrium", "contact_force", "error"] {
+        assert!(checked.as_object().unwrap().contains_key(key));
+        assert_eq!(checked[key], Value::Null, "{key}");
+    }
+    for key in ["nodes", "elements", "subdomains", "primal_dofs", "dual_dofs", "gluing_rows", "contact_rows"] {
+        assert_eq!(checked[key], solved[key], "{key}");
+    }
+}
+
+#[test]
+fn a_newton_limit_that_is_too_low_gives_results_and_exit_code_1() {
+    let run = solve(2, "shear", &["solver.newton_limit=2"]);
+    assert_eq!(run.code, 1, "{}", run.stderr);
+    let summary = run.summary();
+    assert_eq!(summary["converged"], false);
+    assert_eq!(summary["newton_iterations"], 2);
+    assert!(summary["error"].as_str().unwrap().contains("solver.newton_limit"));
+    assert_reads_back(&run);
+}
+
+#[test]
+fn a_qp_limit_that_is_too_low_gives_results_and_exit_code_1() {
+    for scene in ["patch", "shear"] {
+        let run = solve(2, scene, &["solver.qp_limit=3"]);
+        assert_eq!(run.code, 1, "{}", run.stderr);
+        let summary = run.summary();
+        assert_eq!(summary["converged"], false);
+        assert!(summary["error"].as_str().unwrap().contains("solver.qp_limit"), "{}", summary["error"]);
+        assert!(run.result().exists());
+    }
+}
+
+#[test]
+fn the_log_shows_every_newton_step_and_ends_with_the_verdict() {
+    let run = solve(2, "shear", &[]).converged();
+    let steps = run.summary()["newton_iterations"].as_u64().unwrap();
+    for line in ["shear, level 1", "step  criterion", "Converged in", "relative residuals"] {
+        assert_eq!(run.stdout.matches(line).count(), 1, "`{line}` once, not once a rank: {}", run.stdout);
+    }
+    let table =
+        run.stdout.lines().filter(|line| line.split_whitespace().next().is_some_and(|n| n.parse::<u64>().is_ok()));
+    assert_eq!(table.count() as u64, steps, "{}", run.stdout);
+}
