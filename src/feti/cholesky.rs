@@ -6,14 +6,15 @@
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::perm::PermRef;
-use faer::prelude::MatMut;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::traits::RealField;
-use faer::{Conj, Par, Side, Spec};
+use faer::{Par, Side, Spec};
+
+use super::supernodes;
 
 /// Sparsity of a symmetric matrix: its lower triangle by columns, rows ascending.
 #[derive(Clone, Copy)]
@@ -79,23 +80,23 @@ pub struct Breakdown {
 }
 
 impl Analysis {
-    /// In a given elimination order (the unknown at each place), always by supernodes.
+    /// In a given elimination order (the unknown at each place).
     pub fn ordered(lower: Lower, order: &[u32]) -> Self {
         let mut inverse = vec![0; order.len()];
         order.iter().enumerate().for_each(|(place, &unknown)| inverse[unknown as usize] = place as u32);
-        let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        Self::new(lower, SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len())), params)
+        Self::new(lower, SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len())))
     }
 
     /// In an approximate minimum degree order.
     pub fn minimum_degree(lower: Lower) -> Self {
-        Self::new(lower, SymmetricOrdering::Amd, Default::default())
+        Self::new(lower, SymmetricOrdering::Amd)
     }
 
-    fn new(lower: Lower, ordering: SymmetricOrdering<u32>, params: CholeskySymbolicParams) -> Self {
+    fn new(lower: Lower, ordering: SymmetricOrdering<u32>) -> Self {
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
         let symbolic = factorize_symbolic_cholesky(lower.pattern(), Side::Lower, ordering, params);
         Self(symbolic.expect("a factor fits in memory and its index type"))
     }
@@ -111,18 +112,17 @@ pub struct Workspace {
     buffer: MemBuffer,
     /// What is computed in single precision: the matrix, or the unknowns.
     single: Vec<f32>,
+    double: Vec<f64>,
+    panels: (Vec<f32>, Vec<f64>),
 }
 
 impl Workspace {
     /// Large enough for each of these analyses.
     pub fn new<'a>(analyses: impl IntoIterator<Item = &'a Analysis>) -> Self {
-        let request = |Analysis(symbolic): &Analysis| {
-            symbolic
-                .factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default())
-                .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq))
-        };
+        let request =
+            |Analysis(symbolic): &Analysis| symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
         let request = analyses.into_iter().map(request).fold(StackReq::EMPTY, StackReq::or);
-        Self { buffer: MemBuffer::new(request), single: Vec::new() }
+        Self { buffer: MemBuffer::new(request), single: Vec::new(), double: Vec::new(), panels: Default::default() }
     }
 
     /// Overwrites `factor` by the factor of the matrix with these lower values.
@@ -148,18 +148,25 @@ impl Workspace {
     }
 
     /// `x = A^-1 x` with the factor of `A`.
-    pub fn solve(&mut self, analysis: &Analysis, factor: &Factor, x: &mut [f64]) {
-        let stack = MemStack::new(&mut self.buffer);
+    pub fn solve(&mut self, Analysis(symbolic): &Analysis, factor: &Factor, x: &mut [f64]) {
+        // Only a matrix without unknowns is not analysed by supernodes.
+        let (SymbolicCholeskyRaw::Supernodal(panels), Some(order)) = (symbolic.raw(), symbolic.perm()) else { return };
+        let order = order.arrays().0;
         match factor {
-            Factor::Double(factor) => solve(analysis, factor, x, stack),
+            Factor::Double(factor) => {
+                self.double.clear();
+                self.double.extend(order.iter().map(|&k| x[k as usize]));
+                supernodes::solve(panels, factor, &mut self.double, &mut self.panels.1);
+                order.iter().zip(&self.double).for_each(|(&k, &y)| x[k as usize] = y);
+            }
             Factor::Single(factor) => {
                 // Scaled, for the range of single precision is small.
                 let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
                 let scale = if largest > 0.0 { largest } else { 1.0 };
                 self.single.clear();
-                self.single.extend(x.iter().map(|&x| (x / scale) as f32));
-                solve(analysis, factor, &mut self.single, stack);
-                x.iter_mut().zip(&self.single).for_each(|(x, &y)| *x = scale * f64::from(y));
+                self.single.extend(order.iter().map(|&k| (x[k as usize] / scale) as f32));
+                supernodes::solve(panels, factor, &mut self.single, &mut self.panels.0);
+                order.iter().zip(&self.single).for_each(|(&k, &y)| x[k as usize] = scale * f64::from(y));
             }
         }
     }
@@ -181,11 +188,6 @@ fn factorise<T: RealField + Copy>(
             let unknown = symbolic.perm().map_or(place, |order| order.arrays().0[place] as usize);
             Breakdown { place, unknown }
         })
-}
-
-fn solve<T: RealField>(Analysis(symbolic): &Analysis, factor: &[T], x: &mut [T], stack: &mut MemStack) {
-    let x = MatMut::from_column_major_slice_mut(x, symbolic.nrows(), 1);
-    LltRef::new(symbolic, factor).solve_in_place_with_conj(Conj::No, x, Par::Seq, stack);
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use crate::assembly::pattern::Pattern;
 use crate::decomposition::Subdomain;
 
 /// Number of fixing nodes: as many as a box has corners.
-const FIXING_NODES: usize = 8;
+const FIXING_NODES: usize = 4;
 /// Error that a factor in single precision may make.
 const PROBE: f64 = 1e-3;
 

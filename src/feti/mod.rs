@@ -16,6 +16,7 @@ pub mod preconditioner;
 pub mod projector;
 pub mod scaling;
 pub mod space;
+mod supernodes;
 
 /// A torn vector: for each own subdomain its local unknowns.
 pub type Torn = Vec<Vec<f64>>;
