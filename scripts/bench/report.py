@@ -23,7 +23,8 @@ Written by `scripts/tables write` from the runs in [raw](raw); the paper's numbe
 independent programs in [reference.json](reference.json). Variants are named QP solver/preconditioner. `smalse-m/none` is the
 paper's method, with factors in double precision; the others keep factors in single precision where a probe allows it. All
 start from rest but `active-set/dirichlet/cascade`, the default of the program, which starts from the solution of the coarser
-levels. All runs use the paper's tolerances: 1e-4 for Newton's method in the energy norm, 1e-7 for the QP.
+levels. All runs use the paper's tolerances: 1e-4 for Newton's method in the energy norm, 1e-7 for the QP; early Newton steps
+solve theirs less exactly, as far as their own progress allows.
 
 How to read them:
 
