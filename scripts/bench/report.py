@@ -78,8 +78,14 @@ class Group:
 
 
 def spread(values):
-    middle = f"{statistics.median(values):.3g}"
-    return middle if len(values) == 1 else f"{middle} ({min(values):.3g} to {max(values):.3g})"
+    middle = measured(statistics.median(values))
+    least, most = measured(min(values)), measured(max(values))
+    return middle if least == most else f"{middle} ({least} to {most})"
+
+
+def measured(value):
+    """Three digits, or all of an integer part with more."""
+    return f"{value:.3g}" if value < 999.5 else thousands(round(value))
 
 
 def read(variants):
@@ -139,47 +145,45 @@ def cost_table(groups, paper):
         products = summary["hessian_multiplications"] * summary["primal_dofs"]
         return 1e9 * summary["time"]["dual operator"] * summary["ranks"] / products
 
-    return table(
-        ["", "paper", *groups],
-        [
-            count("mesh nodes", "nodes"),
-            count("mesh elements (cells of 6 tetrahedra)", "cells"),
-            count("subdomains", "subdomains"),
-            row("cores", "ranks", lambda group: group.first["ranks"]),
-            count("primal variables", "primal_dofs"),
-            count("dual variables", "dual_dofs"),
-            count("plastic elements", "plastic_elements"),
-            ["share of all tetrahedra", share(paper), *(share(group.first) for group in groups.values())],
-            count("Newton steps", "newton_iterations"),
-            row("... until the paper's criterion", "", lambda group: len(until_papers_criterion(group.first))),
-            row("... on all levels", "", lambda group: thousands(group.of_all_levels("newton_iterations"))),
-            row("outer QP iterations", "smalse_iterations", lambda group: thousands(outer_iterations(group.first))),
-            count("multiplications by F", "hessian_multiplications"),
-            row(
-                "... until the paper's criterion",
-                "",
-                lambda group: sum(step["hessian_multiplications"] for step in until_papers_criterion(group.first)),
-            ),
-            row("... on all levels", "", lambda group: thousands(group.of_all_levels("hessian_multiplications"))),
-            count("preconditioner applications", "preconditioner_applications"),
-            count("factorisations of subdomains", "factorisations"),
-            row("last Newton step [s]", "time_last_newton", lambda g: g.seconds(lambda s: s["newton"][-1]["seconds"])),
-            row(
-                "one multiplication by F per primal unknown and core [ns]",
-                "",
-                lambda group: "" if group.first["cascade"] else group.seconds(one_product),
-            ),
-            row("total time [s]", "time_total", lambda group: group.seconds(lambda summary: summary["time_total"])),
-            row(
-                "... of it on coarser levels",
-                "",
-                lambda g: g.seconds(lambda s: sum(r["seconds"] for r in s["cascade"])) if g.first["cascade"] else "",
-            ),
-            row("... with start and end of the processes", "", lambda group: spread([r["seconds"] for r in group.records])),
-            row("memory [MiB]", "", lambda group: group.seconds(lambda summary: summary["peak_rss_mb"])),
-            row("repetitions", "", lambda group: len(group.records)),
-        ],
-    )
+    rows = [
+        count("mesh nodes", "nodes"),
+        count("mesh elements (cells of 6 tetrahedra)", "cells"),
+        count("subdomains", "subdomains"),
+        row("cores", "ranks", lambda group: group.first["ranks"]),
+        count("primal variables", "primal_dofs"),
+        count("dual variables", "dual_dofs"),
+        count("plastic elements", "plastic_elements"),
+        ["share of all tetrahedra", share(paper), *(share(group.first) for group in groups.values())],
+        count("Newton steps", "newton_iterations"),
+        row("... until the paper's criterion", "", lambda group: len(until_papers_criterion(group.first))),
+        row("... on all levels", "", lambda group: thousands(group.of_all_levels("newton_iterations"))),
+        row("outer QP iterations", "smalse_iterations", lambda group: thousands(outer_iterations(group.first))),
+        count("multiplications by F", "hessian_multiplications"),
+        row(
+            "... until the paper's criterion",
+            "",
+            lambda group: sum(step["hessian_multiplications"] for step in until_papers_criterion(group.first)),
+        ),
+        row("... on all levels", "", lambda group: thousands(group.of_all_levels("hessian_multiplications"))),
+        count("preconditioner applications", "preconditioner_applications"),
+        count("factorisations of subdomains", "factorisations"),
+        row("last Newton step [s]", "time_last_newton", lambda g: g.seconds(lambda s: s["newton"][-1]["seconds"])),
+        row(
+            "one multiplication by F per primal unknown and core [ns]",
+            "",
+            lambda group: "" if group.first["cascade"] else group.seconds(one_product),
+        ),
+        row("total time [s]", "time_total", lambda group: group.seconds(lambda summary: summary["time_total"])),
+        row(
+            "... of it on coarser levels",
+            "",
+            lambda g: g.seconds(lambda s: sum(r["seconds"] for r in s["cascade"])) if g.first["cascade"] else "",
+        ),
+        row("... with start and end of the processes", "", lambda group: spread([r["seconds"] for r in group.records])),
+        row("memory [MiB]", "", lambda group: group.seconds(lambda summary: summary["peak_rss_mb"])),
+        row("repetitions", "", lambda group: len(group.records)),
+    ]
+    return table(["", "paper", *groups], [r for r in rows if any(r[1:])])
 
 
 def result_table(groups, reference):
@@ -231,14 +235,10 @@ class Levels:
         return [name, *(value(self.paper[str(n)]) if str(n) in self.paper else "" for n in self.numbers)]
 
     def of_variants(self, title, value):
-        """A row for each variant that has something to say; the value of a group may be None."""
-        rows = []
-        for variant in self.variants:
-            groups = [self.group(n, variant) for n in self.numbers]
-            values = [None if group is None else value(group) for group in groups]
-            if any(v is not None for v in values):
-                rows.append([f"{title}, {variant}", *("" if v is None else v for v in values)])
-        return rows
+        """A row for each variant that has something to say."""
+        groups = {variant: [self.group(n, variant) for n in self.numbers] for variant in self.variants}
+        rows = [[f"{title}, {v}", *(value(g) if g else "" for g in of_variant)] for v, of_variant in groups.items()]
+        return [row for row in rows if any(row[1:])]
 
     def growth(self, title, key):
         """Counts relative to those of one level."""
@@ -288,7 +288,7 @@ def accuracy(levels, references):
     def difference(key, value):
         def of_group(group):
             expected = references.get(str(group.first["level"]), {}).get(key)
-            return None if expected is None else f"{abs(value(group.first) / expected - 1):.1e}"
+            return "" if expected is None else f"{abs(value(group.first) / expected - 1):.1e}"
 
         return of_group
 
