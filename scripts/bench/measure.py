@@ -8,13 +8,16 @@ import platform
 import subprocess
 import sys
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RAW = ROOT / "bench-results" / "raw"
 
 
 def run(runs, repeat):
-    """All runs (level, variant, ranks), the whole list `repeat` times, so that a slow spell does not hit one kind only."""
+    """All runs (level, Variant, ranks), the whole list `repeat` times, so that a slow spell does not hit one kind only."""
+    if not runs:
+        sys.exit("scripts/tables: nothing to measure with these --levels and --variants")
     subprocess.run(["scripts/setup"], cwd=ROOT, check=True)
     environment = in_environment("env", "-0")
     environment = dict(entry.split("=", 1) for entry in environment.split("\0") if "=" in entry)
@@ -48,23 +51,25 @@ def now():
 
 def solve(level, variant, ranks, environment):
     """One run of the benchmark with the paper's tolerances, which are the scene's own."""
-    qp, preconditioner = variant.split("/")
-    options = ["--level", str(level), "--qp", qp, "--preconditioner", preconditioner, "--progress", "off"]
+    options = ["--level", str(level), *variant.options, "--progress", "off"]
     target = pathlib.Path(environment.get("CARGO_TARGET_DIR", ROOT / "target"))
     started, load = now(), os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as out:
         summary = pathlib.Path(out) / "summary.json"
         command = ["mpirun", "-np", str(ranks), str(target / "release" / "fetiplast"), "solve", "two-blocks", *options]
         command += ["--out", out, "--summary", str(summary)]
+        watch = time.monotonic()
         done = subprocess.run(command, env=environment, capture_output=True, text=True)
+        seconds = time.monotonic() - watch
         found = json.loads(summary.read_text()) if summary.exists() else None
     if done.returncode:
         print(done.stdout + done.stderr, file=sys.stderr)
     return {
         "level": level,
-        "variant": variant,
+        "variant": variant.name,
         "ranks": ranks,
         "exit_code": done.returncode,
+        "seconds": seconds,
         "summary": found,
         "provenance": {
             "command": " ".join(["mpirun", "-np", str(ranks), "fetiplast", "solve", "two-blocks", *options]),
@@ -79,7 +84,7 @@ def told(record):
     return (
         f"level {record['level']}, {record['variant']}, {record['ranks']} ranks: exit code {record['exit_code']}, "
         f"{summary.get('newton_iterations')} Newton steps, {summary.get('hessian_multiplications')} applications of F, "
-        f"{summary.get('time_total') or 0:.1f} s, {summary.get('peak_rss_mb') or 0:.0f} MiB"
+        f"{record['seconds']:.1f} s, {summary.get('peak_rss_mb') or 0:.0f} MiB"
     )
 
 

@@ -14,19 +14,26 @@ BEGIN, END = "<!-- measured: written by scripts/tables write -->", "<!-- /measur
 PAPERS_CRITERION = 1e-4
 """Newton's criterion in the paper. fetiplast also asks for a small residual and may take a step more."""
 
+RESIDUALS = ("equilibrium", "gluing", "gap", "complementarity")
+
 HEAD = """\
 # Tables 1 and 2, measured
 
 Written by `scripts/tables write` from the runs in [raw](raw); the paper's numbers are in [paper.json](paper.json), those of
-independent programs in [reference.json](reference.json). Variants are named QP solver/preconditioner; `smalse-m/none` is the
-paper's method. All runs use the paper's tolerances: 1e-4 for Newton's method in the energy norm, 1e-7 for the QP.
+independent programs in [reference.json](reference.json). Variants are named QP solver/preconditioner. `smalse-m/none` is the
+paper's method, with factors in double precision; the others keep factors in single precision where a probe allows it. All
+start from rest but `active-set/dirichlet/cascade`, the default of the program, which starts from the solution of the coarser
+levels. All runs use the paper's tolerances: 1e-4 for Newton's method in the energy norm, 1e-7 for the QP; early Newton steps
+solve theirs less exactly, as far as their own progress allows.
 
 How to read them:
 
 - Counts are the point. They are the same in every repetition and on every number of ranks. Times are medians of the
   repetitions with smallest and largest value; the paper's come from other processors, Matlab and other numbers of cores, so
   they stand there for completeness only.
-- "Multiplications by F" are all applications of the dual operator, those for norm estimates and residuals included.
+- "Multiplications by F" are all applications of the dual operator, those for norm estimates and residuals included. With a
+  cascade, counts are those of the level itself; rows that say "all levels" add the coarser ones. Times and memory always
+  belong to the whole run.
 - fetiplast ends Newton's method when the paper's criterion *and* a relative residual of 1e-6 are met. The rows "until the
   paper's criterion" count up to the step that meets the paper's criterion alone.
 - The paper gives no coordinates of its bodies. The scene used here reproduces every size of the mesh and of the dual problem
@@ -45,6 +52,8 @@ class Group:
         newest = max(records, key=lambda record: record["provenance"]["date"])
         same = [r for r in records if r["provenance"]["commit"] == newest["provenance"]["commit"]]
         self.records = [r for r in same if r["provenance"]["dirty"] == newest["provenance"]["dirty"]]
+        # In the order of their times.
+        self.records.sort(key=lambda record: record["summary"]["time_total"])
         self.summaries = [record["summary"] for record in self.records]
         self.first = self.summaries[0]
 
@@ -55,13 +64,28 @@ class Group:
             sys.exit(f"scripts/tables: {key} differs between repetitions: {values}")
         return values[0]
 
+    def of_all_levels(self, key):
+        """The number with that of the coarser levels, if there are any."""
+        coarser = self.first["cascade"]
+        return self.count(key) + sum(row[key] for row in coarser) if coarser else None
+
     def seconds(self, value):
         return spread([value(summary) for summary in self.summaries])
 
+    def median(self):
+        """The median of the times."""
+        return statistics.median(summary["time_total"] for summary in self.summaries)
+
 
 def spread(values):
-    middle = f"{statistics.median(values):.3g}"
-    return middle if len(values) == 1 else f"{middle} ({min(values):.3g} to {max(values):.3g})"
+    middle = measured(statistics.median(values))
+    least, most = measured(min(values)), measured(max(values))
+    return middle if least == most else f"{middle} ({least} to {most})"
+
+
+def measured(value):
+    """Three digits, or all of an integer part with more."""
+    return f"{value:.3g}" if value < 999.5 else thousands(round(value))
 
 
 def read(variants):
@@ -85,6 +109,16 @@ def share(numbers):
     return f"{100 * numbers['plastic_elements'] / (6 * numbers['cells']):.1f} %" if numbers else ""
 
 
+def outer_iterations(summary):
+    """Of either QP solver; both have some where SMALSE-M stepped in."""
+    return (summary["smalse_iterations"] or 0) + (summary["active_set_iterations"] or 0)
+
+
+def largest_residual(summary):
+    values = [summary[f"residual_{name}"] for name in RESIDUALS]
+    return max(value for value in values if value is not None)
+
+
 def until_papers_criterion(summary):
     rows = summary["newton"]
     met = next((i for i, row in enumerate(rows) if row["criterion"] <= PAPERS_CRITERION), len(rows) - 1)
@@ -106,37 +140,50 @@ def cost_table(groups, paper):
     def count(name, key):
         return row(name, key, lambda group: thousands(group.count(key)))
 
-    def outer(group):
-        return group.first["smalse_iterations"] or group.first["active_set_iterations"]
+    def one_product(summary):
+        """Of F, in nanoseconds for each unknown on each rank. Times with a cascade belong to several sizes."""
+        products = summary["hessian_multiplications"] * summary["primal_dofs"]
+        return 1e9 * summary["time"]["dual operator"] * summary["ranks"] / products
 
-    return table(
-        ["", "paper", *groups],
-        [
-            count("mesh nodes", "nodes"),
-            count("mesh elements (cells of 6 tetrahedra)", "cells"),
-            count("subdomains", "subdomains"),
-            row("cores", "ranks", lambda group: group.first["ranks"]),
-            count("primal variables", "primal_dofs"),
-            count("dual variables", "dual_dofs"),
-            count("plastic elements", "plastic_elements"),
-            ["share of all tetrahedra", share(paper), *(share(group.first) for group in groups.values())],
-            count("Newton steps", "newton_iterations"),
-            row("... until the paper's criterion", "", lambda group: len(until_papers_criterion(group.first))),
-            row("outer QP iterations", "smalse_iterations", lambda group: thousands(outer(group))),
-            count("multiplications by F", "hessian_multiplications"),
-            row(
-                "... until the paper's criterion",
-                "",
-                lambda group: sum(step["hessian_multiplications"] for step in until_papers_criterion(group.first)),
-            ),
-            count("preconditioner applications", "preconditioner_applications"),
-            count("factorisations of subdomains", "factorisations"),
-            row("last Newton step [s]", "time_last_newton", lambda g: g.seconds(lambda s: s["newton"][-1]["seconds"])),
-            row("total time [s]", "time_total", lambda group: group.seconds(lambda summary: summary["time_total"])),
-            row("memory [MiB]", "", lambda group: group.seconds(lambda summary: summary["peak_rss_mb"])),
-            row("repetitions", "", lambda group: len(group.records)),
-        ],
-    )
+    rows = [
+        count("mesh nodes", "nodes"),
+        count("mesh elements (cells of 6 tetrahedra)", "cells"),
+        count("subdomains", "subdomains"),
+        row("cores", "ranks", lambda group: group.first["ranks"]),
+        count("primal variables", "primal_dofs"),
+        count("dual variables", "dual_dofs"),
+        count("plastic elements", "plastic_elements"),
+        ["share of all tetrahedra", share(paper), *(share(group.first) for group in groups.values())],
+        count("Newton steps", "newton_iterations"),
+        row("... until the paper's criterion", "", lambda group: len(until_papers_criterion(group.first))),
+        row("... on all levels", "", lambda group: thousands(group.of_all_levels("newton_iterations"))),
+        row("outer QP iterations", "smalse_iterations", lambda group: thousands(outer_iterations(group.first))),
+        count("multiplications by F", "hessian_multiplications"),
+        row(
+            "... until the paper's criterion",
+            "",
+            lambda group: sum(step["hessian_multiplications"] for step in until_papers_criterion(group.first)),
+        ),
+        row("... on all levels", "", lambda group: thousands(group.of_all_levels("hessian_multiplications"))),
+        count("preconditioner applications", "preconditioner_applications"),
+        count("factorisations of subdomains", "factorisations"),
+        row("last Newton step [s]", "time_last_newton", lambda g: g.seconds(lambda s: s["newton"][-1]["seconds"])),
+        row(
+            "one multiplication by F per primal unknown and core [ns]",
+            "",
+            lambda group: "" if group.first["cascade"] else group.seconds(one_product),
+        ),
+        row("total time [s]", "time_total", lambda group: group.seconds(lambda summary: summary["time_total"])),
+        row(
+            "... of it on coarser levels",
+            "",
+            lambda g: g.seconds(lambda s: sum(r["seconds"] for r in s["cascade"])) if g.first["cascade"] else "",
+        ),
+        row("... with start and end of the processes", "", lambda group: spread([r["seconds"] for r in group.records])),
+        row("memory [MiB]", "", lambda group: group.seconds(lambda summary: summary["peak_rss_mb"])),
+        row("repetitions", "", lambda group: len(group.records)),
+    ]
+    return table(["", "paper", *groups], [r for r in rows if any(r[1:])])
 
 
 def result_table(groups, reference):
@@ -168,33 +215,107 @@ def result_table(groups, reference):
     rows += [
         row("plastic elements", "plastic_elements", lambda s: s["plastic_elements"], thousands),
         row("active contact pairs", "active_contacts", lambda s: s["active_contacts"], thousands),
-        *(residual(name) for name in ("equilibrium", "gluing", "gap", "complementarity")),
+        *(residual(name) for name in RESIDUALS),
     ]
     return table(["", "reference", *groups], [r for r in rows if r])
 
 
-def scalability(levels, paper):
-    """Multiplications by F and Newton steps at all levels: the short form of Table 2."""
-    numbers = sorted({level for level in levels} | {int(level) for level in paper})
-    variants = list(dict.fromkeys(variant for groups in levels.values() for variant in groups))
+class Levels:
+    """Makes rows of what all levels gave."""
 
-    def row(name, of_paper, of_group, variant=None):
-        cells = []
-        for level in numbers:
-            group = levels.get(level, {}).get(variant)
-            cells.append(of_paper(paper[str(level)]) if variant is None else of_group(group) if group else "")
-        return [name, *cells]
+    def __init__(self, levels, paper):
+        self.levels, self.paper = levels, paper
+        self.numbers = sorted({*levels, *(int(level) for level in paper)})
+        self.variants = list(dict.fromkeys(variant for groups in levels.values() for variant in groups))
 
+    def group(self, level, variant):
+        return self.levels.get(level, {}).get(variant)
+
+    def of_paper(self, name, value):
+        return [name, *(value(self.paper[str(n)]) if str(n) in self.paper else "" for n in self.numbers)]
+
+    def of_variants(self, title, value):
+        """A row for each variant that has something to say."""
+        groups = {variant: [self.group(n, variant) for n in self.numbers] for variant in self.variants}
+        rows = [[f"{title}, {v}", *(value(g) if g else "" for g in of_variant)] for v, of_variant in groups.items()]
+        return [row for row in rows if any(row[1:])]
+
+    def growth(self, title, key):
+        """Counts relative to those of one level."""
+
+        def relative(name, counts):
+            base = counts.get(GROWTH_FROM)
+            return [name, *(f"{counts[n] / base:.2f}" if base and n in counts else "" for n in self.numbers)]
+
+        rows = [relative(f"{title}, paper", {int(n): row[key] for n, row in self.paper.items()})]
+        for variant in self.variants:
+            groups = {n: self.group(n, variant) for n in self.numbers}
+            counts = {n: group.count(key) for n, group in groups.items() if group}
+            if GROWTH_FROM in counts:
+                rows.append(relative(f"{title}, {variant}", counts))
+        return rows
+
+
+GROWTH_FROM = 2
+"""Level that growth is measured from; the 6 subdomains of the first say little."""
+
+
+def scalability(levels, ranks):
+    """Counts, times and memory at all levels: the short form of Table 2."""
     rows = [
-        row("subdomains", lambda p: p["subdomains"], None),
-        row("dual unknowns", lambda p: thousands(p["dual_dofs"]), None),
+        levels.of_paper("subdomains", lambda p: p["subdomains"]),
+        levels.of_paper("dual unknowns", lambda p: thousands(p["dual_dofs"])),
     ]
     for title, key in (("Newton steps", "newton_iterations"), ("multiplications by F", "hessian_multiplications")):
-        rows.append(row(f"{title}, paper", lambda p: thousands(p[key]), None))
-        rows += [row(f"{title}, {v}", None, lambda g: thousands(g.count(key)), v) for v in variants]
-    rows += [row(f"seconds on 2 ranks, {v}", None, lambda g: g.seconds(lambda s: s["time_total"]), v) for v in variants]
-    rows += [row(f"MiB on 2 ranks, {v}", None, lambda g: g.seconds(lambda s: s["peak_rss_mb"]), v) for v in variants]
-    return table(["level", *numbers], rows)
+        rows.append(levels.of_paper(f"{title}, paper", lambda p: thousands(p[key])))
+        rows += levels.of_variants(title, lambda g: thousands(g.count(key)))
+        rows += levels.of_variants(f"{title} on all levels", lambda g: thousands(g.of_all_levels(key)))
+    rows += levels.of_variants(f"seconds on {ranks} ranks", lambda g: g.seconds(lambda s: s["time_total"]))
+    rows += levels.of_variants(f"MiB on {ranks} ranks", lambda g: g.seconds(lambda s: s["peak_rss_mb"]))
+    return table(["level", *levels.numbers], rows)
+
+
+def growth(levels):
+    """How counts grow with the number of subdomains."""
+    rows = levels.growth("Newton steps", "newton_iterations")
+    rows += levels.growth("multiplications by F", "hessian_multiplications")
+    return table(["level", *levels.numbers], rows)
+
+
+def accuracy(levels, references):
+    """How right the solutions are, at all levels."""
+
+    def difference(key, value):
+        def of_group(group):
+            expected = references.get(str(group.first["level"]), {}).get(key)
+            return "" if expected is None else f"{abs(value(group.first) / expected - 1):.1e}"
+
+        return of_group
+
+    rows = levels.of_variants("largest residual", lambda g: f"{largest_residual(g.first):.1e}")
+    rows += levels.of_variants("difference of J", difference("energy", lambda s: s["energy"]))
+    force = difference("contact_force", lambda summary: summary["contact_force"][2])
+    rows += levels.of_variants("difference of contact force", force)
+    return table(["level", *levels.numbers], rows)
+
+
+def profile(levels):
+    """Where the time goes: phases of the fastest variant at the highest level."""
+    level = max(levels.levels)
+    variant, group = min(levels.levels[level].items(), key=lambda item: item[1].median())
+    summary = group.summaries[(len(group.summaries) - 1) // 2]
+    total = summary["time_total"]
+    phases = sorted(summary["time"].items(), key=lambda phase: -phase[1])
+    # Ranks are slow in different phases, so that all together may exceed the total.
+    phases.append(("other", max(0.0, total - sum(seconds for _, seconds in phases))))
+    rows = [[name, f"{seconds:.3g}", f"{100 * seconds / total:.1f} %"] for name, seconds in phases]
+    rows.append(["total", f"{total:.3g}", ""])
+    text = (
+        f"The fastest variant at the highest level: `{variant}` at level {level} on {summary['ranks']} ranks, the run of "
+        f"median time{', coarser levels included' if summary['cascade'] else ''}. Each phase is on its slowest rank; "
+        "waiting for other ranks counts as the phase that waits.\n\n"
+    )
+    return text + table(["phase", "seconds", "share"], rows)
 
 
 def table_1(groups, study, paper):
@@ -208,38 +329,35 @@ def table_1(groups, study, paper):
         for p in paper["rows"]
     ]
     equal = []
-    for variant in study["variants"]:
-        found = [(r, groups[study["level"], variant, r]) for r in study["ranks"] if (study["level"], variant, r) in groups]
-        if not found:
-            continue
-        median = [statistics.median(s["time_total"] for s in group.summaries) for _, group in found]
-        for (ranks, group), seconds in zip(found, median):
-            outer = group.first["smalse_iterations"] or group.first["active_set_iterations"]
+    for variant, level, ranks in study:
+        found = [(r, groups[level, variant, r]) for r in ranks if (level, variant, r) in groups]
+        for r, group in found:
             rows.append(
-                [f"{variant}, level {study['level']}", ranks, group.count("newton_iterations"), outer]
+                [f"{variant}, level {level}", r, group.count("newton_iterations"), outer_iterations(group.first)]
                 + [thousands(group.count("hessian_multiplications"))]
                 + [group.seconds(lambda s: s["newton"][-1]["seconds"]), group.seconds(lambda s: s["time_total"])]
-                + [f"{median[0] / seconds:.2f}", group.seconds(lambda s: s["peak_rss_mb"])]
+                + [f"{found[0][1].median() / group.median():.2f}" if found[0][0] == ranks[0] else ""]
+                + [group.seconds(lambda s: s["peak_rss_mb"])]
             )
         if len(found) > 1 and len({g.records[0]["provenance"]["commit"] for _, g in found}) == 1:
-            equal.append(equality(variant, [group.first for _, group in found]))
+            equal.append(equality(variant, level, [group.first for _, group in found]))
     return table(head, rows) + "\n" + " ".join(equal) + "\n"
 
 
-DEPENDS_ON_RANKS = {"ranks", "warnings", "time", "time_total", "peak_rss_mb", "memory_estimate_mb", "newton"}
+DEPENDS_ON_RANKS = {"ranks", "warnings", "time", "time_total", "peak_rss_mb", "memory_estimate_mb", "newton", "cascade"}
 
 
-def equality(variant, summaries):
+def equality(variant, level, summaries):
     """Whether everything but times and memory is the same, to the last bit."""
 
     def essence(summary):
-        steps = [{k: v for k, v in row.items() if k != "seconds"} for row in summary["newton"]]
-        return {k: v for k, v in summary.items() if k not in DEPENDS_ON_RANKS} | {"steps": steps}
+        rows = [{k: v for k, v in row.items() if k != "seconds"} for row in summary["newton"] + summary["cascade"]]
+        return {k: v for k, v in summary.items() if k not in DEPENDS_ON_RANKS} | {"steps": rows}
 
     differing = [k for k, v in essence(summaries[0]).items() if any(essence(s)[k] != v for s in summaries)]
     if differing:
-        return f"**`{variant}`: the numbers of ranks differ in {', '.join(differing)}.**"
-    return f"`{variant}`: every number of the summary but times and memory is equal to the last bit on all of these."
+        return f"**`{variant}`, level {level}: runs on other numbers of ranks differ in {', '.join(differing)}.**"
+    return f"`{variant}`, level {level}: every number of the summary but times and memory is equal to the last bit on all of these."
 
 
 def circumstances(groups):
@@ -261,18 +379,23 @@ def circumstances(groups):
     return "\n".join(lines) + "\n"
 
 
-def contents(variants, study):
+def contents(variants, study, ranks):
     """Every file this writes, with its text."""
     paper = json.loads((RESULTS / "paper.json").read_text())
     references = json.loads((RESULTS / "reference.json").read_text())["levels"]
     groups = read(variants)
     levels = {}
-    for level, variant, ranks in sorted(groups, key=lambda kind: (kind[0], variants.index(kind[1]), kind[2])):
-        if ranks == 2:
-            levels.setdefault(level, {})[variant] = groups[level, variant, ranks]
+    for level, variant, on in sorted(groups, key=lambda kind: (kind[0], variants.index(kind[1]))):
+        if on == ranks:
+            levels.setdefault(level, {})[variant] = groups[level, variant, on]
 
-    short = scalability(levels, paper["table2"])
+    all_levels = Levels(levels, paper["table2"])
+    short = scalability(all_levels, ranks)
     text = [HEAD, "## Table 2 in short\n", short, "![Multiplications by F against subdomains](scalability.svg)\n"]
+    text += [f"## Growth, level {GROWTH_FROM} = 1\n", growth(all_levels)]
+    if levels:
+        text += ["## Accuracy: residuals, and relative difference from independent programs\n"]
+        text += [accuracy(all_levels, references), "## Where the time goes\n", profile(all_levels)]
     for level, of_level in levels.items():
         text += [f"## Table 2, level {level}\n", cost_table(of_level, paper["table2"].get(str(level), {}))]
         text += [result_table(of_level, references.get(str(level), {}))]
@@ -298,9 +421,10 @@ def contents(variants, study):
     }
 
 
-def write(variants, study, only_check):
+def write(variants, study, ranks, only_check):
+    """Writes what has changed. `study` lists the rows of Table 1, `ranks` are those of Table 2."""
     stale = []
-    for path, text in contents(variants, study).items():
+    for path, text in contents(variants, study, ranks).items():
         if not path.exists() or path.read_text() != text:
             stale.append(str(path.relative_to(ROOT)))
             if not only_check:
