@@ -162,7 +162,8 @@ pub fn memory_estimate_mb(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -
     let Discrete { decomposition, constraints, .. } = discrete;
     let analysed = analyse(&decomposition.subdomains);
     // The interior factor of the Dirichlet preconditioner is about a third of the whole one on cubes.
-    let factors = if scene.solver.preconditioner == scene::Preconditioner::Dirichlet { 1.35 } else { 1.0 };
+    let interior = if scene.solver.preconditioner == scene::Preconditioner::Dirichlet { 1.35 } else { 1.0 };
+    let factors = if scene.solver.precision == scene::Precision::Mixed { 0.5 * interior } else { interior };
     let doubles: f64 = analysed
         .iter()
         .map(|s| {

@@ -90,6 +90,20 @@ impl Pattern {
         }
     }
 
+    /// Whether no entries of two matrices differ by more than `share` times the geometric mean of their diagonals.
+    pub fn differ_at_most(&self, share: f64, values: &[f64], others: &[f64]) -> bool {
+        let diagonal = self.diagonal(values);
+        (0..self.dofs()).all(|column| {
+            let range = self.column_begin[column] as usize..self.column_begin[column + 1] as usize;
+            let limit = share * share * diagonal[column];
+            let entries = values[range.clone()].iter().zip(&others[range.clone()]);
+            self.rows[range]
+                .iter()
+                .zip(entries)
+                .all(|(&row, (a, b))| (a - b) * (a - b) <= limit * diagonal[row as usize])
+        })
+    }
+
     /// The diagonal of the matrix with these values.
     pub fn diagonal(&self, values: &[f64]) -> Vec<f64> {
         (0..self.dofs()).map(|c| values[self.column_begin[c] as usize]).collect()
@@ -99,6 +113,20 @@ impl Pattern {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn differences_count_relative_to_the_diagonal() {
+        let pattern = Pattern::new(4, &[[0, 1, 2, 3]], &[]);
+        let mut values = vec![0.0; pattern.rows.len()];
+        let block = |s: f64| [[s, 0.0, 0.0], [0.0, s, 0.0], [0.0, 0.0, s]];
+        (0..4).for_each(|n| pattern.add_block(&mut values, n, n, &block(if n == 3 { 100.0 } else { 1.0 })));
+        let mut others = values.clone();
+        // The diagonals are 1 and 100: 0.5 is a share of 0.05.
+        pattern.add_block(&mut others, 3, 1, &block(0.5));
+        assert!(pattern.differ_at_most(0.051, &values, &others) && !pattern.differ_at_most(0.049, &values, &others));
+        others[0] = f64::NAN;
+        assert!(!pattern.differ_at_most(1.0, &values, &others));
+    }
 
     #[test]
     fn blocks_land_where_they_belong() {

@@ -21,11 +21,14 @@ pub struct Forcing {
     pub drop: f64,
     /// ... but not below the scene's tolerance times this.
     pub floor: f64,
+    /// Reduction of the true residual that is left to do. A tangent whose entries have changed by less, relative to its
+    /// diagonal, may stand for the new one: Newton's method converges at that rate at least.
+    pub left: f64,
 }
 
 impl Default for Forcing {
     fn default() -> Self {
-        Self { drop: FIRST, floor: 1.0 }
+        Self { drop: FIRST, floor: 1.0, left: 0.0 }
     }
 }
 
@@ -34,6 +37,7 @@ impl Forcing {
     /// end. `at_floor` says that the program was solved to the floor.
     pub fn update(&mut self, before: f64, after: f64, wanted: f64, at_floor: bool) {
         let ratio = after / before;
+        self.left = (wanted / after).min(LOOSEST);
         self.drop = (SHARE * ratio * ratio).clamp(TIGHTEST, LOOSEST);
         if at_floor && after > wanted {
             self.floor *= (MARGIN * wanted / after).max(TIGHTEST);
@@ -44,6 +48,7 @@ impl Forcing {
     pub fn tighten(&mut self) {
         self.drop *= FIRST;
         self.floor *= FIRST;
+        self.left = 0.0;
     }
 }
 
@@ -55,11 +60,11 @@ mod tests {
     fn accuracy_follows_the_residual() {
         let mut forcing = Forcing::default();
         forcing.update(1.0, 0.5, 1e-6, false);
-        assert_eq!(forcing, Forcing { drop: LOOSEST, floor: 1.0 });
+        assert_eq!(forcing, Forcing { drop: LOOSEST, floor: 1.0, left: 2e-6 });
         forcing.update(0.5, 0.05, 1e-6, false);
         assert!((forcing.drop - SHARE * 0.01).abs() < 1e-15);
         forcing.update(0.05, 1e-5, 1e-6, true);
-        assert_eq!(forcing.drop, TIGHTEST);
+        assert_eq!((forcing.drop, forcing.left), (TIGHTEST, LOOSEST));
         assert!((forcing.floor - 0.1 * MARGIN).abs() < 1e-15);
     }
 }

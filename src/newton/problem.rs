@@ -41,6 +41,8 @@ pub struct State {
     pub external_work: f64,
     /// Elements that yield.
     pub plastic: usize,
+    /// Elements of each own subdomain that yield.
+    pub yielding: Vec<usize>,
     /// What could cancel in forces and energies.
     pub terms: Terms,
 }
@@ -64,10 +66,12 @@ impl TornProblem<'_> {
     pub fn evaluate(&self, u: &Torn) -> State {
         let mut forces = self.gather.zeros();
         let mut partial = Vec::with_capacity(5 * u.len());
+        let mut yielding = Vec::with_capacity(u.len());
         for (own, subdomain) in self.subdomains.iter().enumerate() {
             let found = internal::add_forces(subdomain, &self.materials[own], &u[own], &mut forces[own]);
             let Terms { energy, force_squares } = found.terms;
             let work = dot(&self.loads[own], &u[own]);
+            yielding.push(found.plastic);
             partial.extend([found.energy, work, found.plastic as f64, energy, force_squares]);
         }
         let sum = self.space.sum(&partial, 5);
@@ -77,6 +81,7 @@ impl TornProblem<'_> {
             internal_energy: sum[0],
             external_work: sum[1],
             plastic: sum[2] as usize,
+            yielding,
             terms: Terms { energy: sum[3], force_squares: sum[4] },
         }
     }

@@ -40,10 +40,12 @@ pub struct StepSolver<'a> {
     projector: Projector<'a>,
     preconditioner: Option<Preconditioner<'a>>,
     programs: Programs,
-    /// Lower values of each own subdomain's tangent.
+    /// Lower values of each own subdomain's tangent, as it was factorised.
     tangents: Vec<Vec<f64>>,
-    /// How many elements of each own subdomain yield; none before the first step.
+    /// How many of its elements yield; none if there is no factor to go on with.
     yielding: Vec<Option<usize>>,
+    /// Scratch: a tangent that may be worth factorising.
+    assembled: Vec<f64>,
 }
 
 impl<'a> StepSolver<'a> {
@@ -56,7 +58,8 @@ impl<'a> StepSolver<'a> {
         own: usize,
     ) -> Self {
         let (tangents, yielding) = (vec![Vec::new(); own], vec![None; own]);
-        Self { operator, projector, preconditioner, programs: Programs::new(settings), tangents, yielding }
+        let (programs, assembled) = (Programs::new(settings), Vec::new());
+        Self { operator, projector, preconditioner, programs, tangents, yielding, assembled }
     }
 
     /// Starts from the multipliers that a displacement and the rows that hold there suggest; returns them. `B B' = I`, so
@@ -106,7 +109,7 @@ impl<'a> StepSolver<'a> {
         timer: &Timer,
     ) -> Result<Step, String> {
         let before = self.operator.applications();
-        let factorisations = self.update_tangents(problem, u, timer)?;
+        let factorisations = self.update_tangents(problem, u, state, forcing.left, timer)?;
         let rows = problem.gather.rows();
 
         let forces = problem.unbalance(state);
@@ -159,23 +162,38 @@ impl<'a> StepSolver<'a> {
         timer.time("preconditioner", || preconditioner.mend(stiffness, &defect, du));
     }
 
-    /// Assembles the tangents at `u` and factorises those that changed; returns how many, over all ranks.
-    fn update_tangents(&mut self, problem: &TornProblem, u: &Torn, timer: &Timer) -> Result<usize, String> {
+    /// Assembles the tangents at `u` and factorises those that changed by more than `left`; returns how many, over all
+    /// ranks.
+    fn update_tangents(
+        &mut self,
+        problem: &TornProblem,
+        u: &Torn,
+        state: &State,
+        left: f64,
+        timer: &Timer,
+    ) -> Result<usize, String> {
         let mut failure: Option<NotDefinite> = None;
         let mut factorised = Vec::with_capacity(u.len());
         for (own, subdomain) in problem.subdomains.iter().enumerate() {
-            let pattern = &self.operator.factors.symbolic(own).pattern;
-            let values = &mut self.tangents[own];
-            values.resize(pattern.rows.len(), 0.0);
-            let material = &problem.materials[own];
-            let plastic = timer.time("assembly", || stiffness::assemble(subdomain, material, &u[own], pattern, values));
             // An elastic tangent that was elastic before is the same matrix.
-            let unchanged = self.yielding[own] == Some(0) && plastic == 0;
-            self.yielding[own] = Some(plastic);
-            factorised.push(f64::from(!unchanged));
+            let unchanged = self.yielding[own] == Some(0) && state.yielding[own] == 0;
             if unchanged || failure.is_some() {
+                factorised.push(0.0);
                 continue;
             }
+            let pattern = &self.operator.factors.symbolic(own).pattern;
+            let material = &problem.materials[own];
+            self.assembled.resize(pattern.rows.len(), 0.0);
+            let assembled = &mut self.assembled;
+            timer.time("assembly", || stiffness::assemble(subdomain, material, &u[own], pattern, assembled));
+            let values = &mut self.tangents[own];
+            if self.yielding[own].is_some() && pattern.differ_at_most(left, values, assembled) {
+                factorised.push(0.0);
+                continue;
+            }
+            factorised.push(1.0);
+            self.yielding[own] = Some(state.yielding[own]);
+            values.clone_from(assembled);
             let outcome = timer.time("factorisation", || self.operator.factors.factorise(own, subdomain, values));
             let interior = self.preconditioner.as_mut().and_then(|p| p.interior.as_mut());
             let outcome = outcome.and_then(|()| match interior {
