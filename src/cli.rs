@@ -107,7 +107,10 @@ impl Cascade {
             return Vec::new();
         }
         let mut levels: Vec<usize> =
-            std::iter::successors(Some(level), |l| Some(l - 1)).skip(1).take_while(|l| *l > 0).collect();
+            std::iter::successors(Some(level), |l| Some(if *l > 1 { l.div_ceil(2) } else { 0 }))
+                .skip(1)
+                .take_while(|l| *l > 0)
+                .collect();
         levels.reverse();
         levels
     }
