@@ -80,7 +80,7 @@ pub struct Solve {
     /// none, lumped or dirichlet. Short for --set solver.preconditioner=...
     #[arg(long, value_name = "NAME")]
     preconditioner: Option<String>,
-    /// Solve coarser levels first and start from them: auto (where it pays), on or off.
+    /// Solve half the level first, and so on, and start from there: auto (where it pays), on or off.
     #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
     cascade: Cascade,
     /// Life signs inside a Newton step: auto, plain or off.
@@ -106,11 +106,8 @@ impl Cascade {
         if self == Self::Off || (self == Self::Auto && linear) {
             return Vec::new();
         }
-        let mut levels: Vec<usize> =
-            std::iter::successors(Some(level), |l| Some(if *l > 1 { l.div_ceil(2) } else { 0 }))
-                .skip(1)
-                .take_while(|l| *l > 0)
-                .collect();
+        let half = |l: &usize| (*l > 1).then(|| l.div_ceil(2));
+        let mut levels: Vec<usize> = std::iter::successors(half(&level), half).collect();
         levels.reverse();
         levels
     }
@@ -250,7 +247,8 @@ fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
         let watch = timer.total_seconds();
         // A level that is too coarse for the scene is left out.
         let Ok(scene) = found.at_level(level, &sets) else { continue };
-        let (discrete, solved) = solve_level(&source, level, &scene, coarser.take(), comm, &timer, &mut monitor)?;
+        let solved = solve_level(&source, level, &scene, coarser.take(), comm, &timer, &mut monitor);
+        let Ok((discrete, solved)) = solved else { continue };
         let Summary { newton_iterations, counters, sizes, converged, .. } = &solved.summary;
         rows.push(CascadeRow {
             level,
@@ -263,14 +261,12 @@ fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
         coarser = (*converged == Some(true)).then_some((discrete, solved));
     }
     let (discrete, mut solved) = solve_level(&source, source.level, &scene, coarser, comm, &timer, &mut monitor)?;
-    let warnings = warnings(&scene, &discrete, comm);
-    warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
     timer.time("output", || vtkhdf::write(comm, &result, &solved.piece, &solved.records))?;
 
     let table = PhaseTable::gather(comm, &timer);
     let summary = &mut solved.summary;
     describe_run(summary, &source, comm);
-    summary.warnings = warnings;
+    summary.warnings = warnings(&scene, &discrete, comm);
     summary.cascade = rows;
     summary.time = table.max_seconds();
     summary.time_total = Some(table.total_seconds);
@@ -301,6 +297,9 @@ fn solve_level(
     let discrete = timer.time("discretisation", || study::discretise(scene, comm))?;
     let sizes = study::sizes(&discrete, comm);
     monitor.event(&Event::Sizes { scene: source.scene.clone(), level, ranks: comm.size(), sizes });
+    if level == source.level {
+        warnings(scene, &discrete, comm).into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
+    }
     let start = coarser
         .map(|(coarse, solved)| timer.time("interpolation", || study::refine(comm, (&coarse, &solved), &discrete)));
     let solved = study::solve(scene, &discrete, comm, start, timer, &mut |event| monitor.event(&event))?;

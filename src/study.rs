@@ -1,5 +1,6 @@
 //! The pipeline from a scene to results: the only file that sees every stage.
 
+use std::cell::RefCell;
 use std::time::SystemTime;
 
 use thiserror::Error;
@@ -26,7 +27,7 @@ use crate::material::Material;
 use crate::mesh::{Brick, Face};
 use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
-use crate::newton::{self, Method, ProgramSettings, Settings, Solution, StepRecord, StepSolver, TornProblem};
+use crate::newton::{self, Method, ProgramSettings, Settings, Solution, StepRecord, StepSolver, TornProblem, Watch};
 use crate::qp::mprgp::Expansion;
 use crate::results::agree::agree;
 use crate::results::fields::{self, ContactState};
@@ -204,10 +205,10 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
     let (from, to) = ((&coarse.bodies[..], &coarse.pairs[..]), (&fine.bodies[..], &fine.pairs[..]));
     let closed = cascade::closed_contacts(comm, from, &solved.closed, to);
     let held = |kind| if let Kind::Contact { pair } = kind { closed[pair] } else { true };
-    newton::Start { u, held: Some(fine.constraints.rows.iter().map(|row| held(row.kind)).collect()) }
+    newton::Start { u, held: fine.constraints.rows.iter().map(|row| held(row.kind)).collect() }
 }
 
-/// Solves a discretised scene, from rest or from a start; `report` is told of every Newton step. Collective.
+/// Solves a discretised scene, from rest or from a start; `report` is told what happens. Collective.
 ///
 /// # Errors
 /// If the constraints leave a rigid motion free.
@@ -270,9 +271,13 @@ pub fn solve(
     };
     let operator = DualOperator::new(Factors::new(symbolic, precision), &gather);
     let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, subdomains.len());
-    let solution = newton::solve(&problem, &mut steps, &settings, start, timer, &mut |record| {
-        report(Event::NewtonStep(newton_row(record)))
-    });
+    let report = RefCell::new(report);
+    let alive = |step, applications| {
+        report.borrow_mut()(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });
+    };
+    let step = |record: &StepRecord| report.borrow_mut()(Event::NewtonStep(newton_row(record)));
+    let watch = Watch { timer, alive: &alive, step: &step };
+    let solution = newton::solve(&problem, &mut steps, &settings, start, &watch);
 
     let contact = contact_states(&problem, &solution);
     let piece = fields::piece(decomposition, &discrete.materials, &solution.u, &discrete.pairs, &contact, comm.rank());

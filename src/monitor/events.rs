@@ -26,12 +26,8 @@ pub enum Event {
     Inner {
         /// Newton step, from 1.
         step: u64,
-        /// Outer iterations of the QP solver in this step.
-        qp_iterations: u64,
         /// Applications of F in this step.
         hessian_multiplications: u64,
-        /// Relative residual of the QP.
-        residual: f64,
     },
     /// A Newton step is done.
     NewtonStep(NewtonRow),

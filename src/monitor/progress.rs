@@ -1,7 +1,7 @@
 //! Life signs from inside a Newton step.
 //!
-//! On a terminal one line that is overwritten in place; in a log file at most one line every ten seconds, and no control
-//! characters.
+//! On a terminal one line that is overwritten in place; in a log file, for who wants it, at most one line every ten
+//! seconds, and no control characters.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use super::events::{Event, Sink};
 /// What `--progress` says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// In place on a terminal, else plain.
+    /// In place on a terminal, else nothing.
     #[default]
     Auto,
     /// Log lines.
@@ -48,9 +48,9 @@ impl Progress {
     pub fn on_stderr(mode: Mode) -> Self {
         let stderr = std::io::stderr();
         let style = match mode {
-            Mode::Off => Style::Silent,
             Mode::Auto if stderr.is_terminal() => Style::InPlace { terminal: Box::new(stderr), visible: false },
-            Mode::Auto | Mode::Plain => Style::Lines,
+            Mode::Auto | Mode::Off => Style::Silent,
+            Mode::Plain => Style::Lines,
         };
         Self { style, last: None }
     }
@@ -73,11 +73,11 @@ impl Sink for Progress {
             _ => PAUSE_BETWEEN_LINES,
         };
         let text = match event {
-            Event::Inner { step, qp_iterations, hessian_multiplications, residual } => {
+            Event::Inner { step, hessian_multiplications } => {
                 if !self.is_due(pause) {
                     return;
                 }
-                format!("     step {step}: QP {qp_iterations}, F {hessian_multiplications}, residual {residual:.1e}")
+                format!("     step {step}: {hessian_multiplications} applications of F")
             }
             _ => String::new(),
         };
@@ -116,12 +116,12 @@ mod tests {
         let style = Style::InPlace { terminal: Box::new(screen.clone()), visible: false };
         let long_ago = Instant::now().checked_sub(Duration::from_secs(1));
         let mut progress = Progress { style, last: long_ago };
-        let inner = Event::Inner { step: 2, qp_iterations: 7, hessian_multiplications: 91, residual: 3e-5 };
+        let inner = Event::Inner { step: 2, hessian_multiplications: 91 };
         progress.event(&inner);
         progress.event(&inner);
         progress.event(&Event::Warning("slow".into()));
         progress.event(&Event::Warning("slow".into()));
         let text = String::from_utf8(screen.0.lock().unwrap().clone()).unwrap();
-        assert_eq!(text, format!("{CLEAR}     step 2: QP 7, F 91, residual 3.0e-5{CLEAR}"));
+        assert_eq!(text, format!("{CLEAR}     step 2: 91 applications of F{CLEAR}"));
     }
 }

@@ -37,6 +37,8 @@ pub struct Dual<'s, 'a> {
     pub tangents: &'s [Vec<f64>],
     /// Where the time goes.
     pub timer: &'s Timer,
+    /// Told the applications of F so far.
+    pub alive: &'s dyn Fn(usize),
 }
 
 impl<'a> Dual<'_, 'a> {
@@ -56,6 +58,7 @@ impl<'a> Dual<'_, 'a> {
 impl Operator for Dual<'_, '_> {
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.timer.time("dual operator", || self.operator.apply(x, y));
+        (self.alive)(self.operator.applications());
     }
 }
 

@@ -104,8 +104,8 @@ pub struct StepRecord {
 pub struct Start {
     /// Torn displacement.
     pub u: Torn,
-    /// Rows that hold there: all equalities and the closed contacts; `None` if nothing is known of contacts.
-    pub held: Option<Vec<bool>>,
+    /// Rows that hold there: all equalities and the closed contacts.
+    pub held: Vec<bool>,
 }
 
 /// The solution and what it took.
@@ -130,16 +130,28 @@ pub struct Solution {
     pub plastic_elements: usize,
 }
 
-/// Solves from rest or from `start`; `report` is told of every step. Collective.
+/// Who watches.
+pub struct Watch<'a> {
+    /// Where the time goes.
+    pub timer: &'a Timer,
+    /// Told the number of the step and the applications of F in it so far.
+    pub alive: &'a dyn Fn(usize, usize),
+    /// Told of every step that is done.
+    pub step: &'a dyn Fn(&StepRecord),
+}
+
+/// Solves from rest or from `start`. Collective.
 pub fn solve(
     problem: &TornProblem,
     solver: &mut StepSolver,
     settings: &Settings,
     start: Option<Start>,
-    timer: &Timer,
-    report: &mut dyn FnMut(&StepRecord),
+    &Watch { timer, alive, step: report }: &Watch,
 ) -> Solution {
-    let (mut u, held) = start.map_or_else(|| (problem.gather.zeros(), None), |start| (start.u, start.held));
+    let (mut u, held) = match start {
+        Some(Start { u, held }) => (u, Some(held)),
+        None => (problem.gather.zeros(), None),
+    };
     if held.is_some() {
         problem.make_admissible(&mut u);
     }
@@ -155,7 +167,7 @@ pub fn solve(
         if problem.is_linear() {
             forcing.drop = solver.linear_drop();
         }
-        let step = match solver.solve(problem, &u, &state, forcing, timer) {
+        let step = match solver.solve(problem, (&u, &state), forcing, timer, &|n| alive(steps.len() + 1, n)) {
             Ok(step) => step,
             Err(message) => break Outcome::Singular(message),
         };

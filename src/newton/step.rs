@@ -96,17 +96,17 @@ impl<'a> StepSolver<'a> {
         }
     }
 
-    /// Solves for the step at `u`. Collective.
+    /// Solves for the step at `u`; `alive` is told the applications of F so far. Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent or the coarse problem is singular.
     pub fn solve(
         &mut self,
         problem: &TornProblem,
-        u: &Torn,
-        state: &State,
+        (u, state): (&Torn, &State),
         forcing: Forcing,
         timer: &Timer,
+        alive: &dyn Fn(usize),
     ) -> Result<Step, String> {
         let before = self.operator.applications();
         let factorisations = self.update_tangents(problem, u, state, forcing.left, timer)?;
@@ -129,6 +129,7 @@ impl<'a> StepSolver<'a> {
             preconditioner: self.preconditioner.as_mut(),
             tangents: &self.tangents,
             timer,
+            alive: &|applications| alive(applications - before),
         };
         let found = self.programs.solve(problem, dual, warm, b, forcing).map_err(|floating| floating.to_string())?;
         let Found { lambda, balanced, outcome, statistics, at_floor } = found;

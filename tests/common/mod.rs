@@ -61,9 +61,15 @@ pub fn solve(ranks: usize, scene: &str, sets: &[&str]) -> Run {
 
 /// As [`solve`], refined.
 pub fn solve_level(ranks: usize, scene: &str, level: usize, sets: &[&str]) -> Run {
+    solve_with(ranks, scene, level, sets, &[])
+}
+
+/// As [`solve_level`], with more options.
+pub fn solve_with(ranks: usize, scene: &str, level: usize, sets: &[&str], more: &[&str]) -> Run {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().to_str().unwrap().to_owned();
-    scene_command("solve", ranks, scene, level, sets, &["--progress", "off", "--out", &out], directory)
+    let more = [&["--progress", "off", "--out", &out], more].concat();
+    scene_command("solve", ranks, scene, level, sets, &more, directory)
 }
 
 /// Checks a scene without solving it.
