@@ -112,7 +112,9 @@ pub struct Workspace {
     buffer: MemBuffer,
     /// What is computed in single precision: the matrix, or the unknowns.
     single: Vec<f32>,
+    /// The unknowns of a solve in double precision, in the order of elimination.
     double: Vec<f64>,
+    /// The unknowns that one supernode touches.
     panels: (Vec<f32>, Vec<f64>),
 }
 

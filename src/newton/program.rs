@@ -10,6 +10,7 @@ use super::forcing::Forcing;
 use super::problem::TornProblem;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::face::CoarseFace;
+use crate::feti::projector::Projector;
 use crate::qp::bounds::Bounds;
 use crate::qp::mprgp::Expansion;
 use crate::qp::pcpg::Pcpg;
@@ -80,17 +81,16 @@ impl Programs {
     }
 
     /// Multipliers with `G l = e` next to the last ones: the smallest such if there are none.
-    pub fn start(&self, coarse: &Coarse, rows: usize, balance: Vec<f64>) -> Warm {
-        let mut lambda = self.last.as_ref().map_or_else(|| vec![0.0; rows], |(last, _)| last.clone());
-        let mut missing: Vec<f64> = balance.iter().zip(coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
-        match &self.last {
-            // Open contacts stay open.
-            Some((_, face)) => face.add_balance(coarse, missing, &mut lambda),
-            None => {
-                coarse.solve(&mut missing);
-                coarse.add_transpose(1.0, &missing, &mut lambda);
-            }
-        }
+    pub fn start(&self, projector: &Projector, rows: usize, balance: Vec<f64>) -> Warm {
+        let Some((last, face)) = &self.last else {
+            let mut lambda = vec![0.0; rows];
+            projector.particular(&balance, &mut lambda);
+            return Warm { balance, lambda };
+        };
+        let mut lambda = last.clone();
+        let missing = balance.iter().zip(projector.coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
+        // Open contacts stay open.
+        face.add_balance(&projector.coarse, missing, &mut lambda);
         Warm { balance, lambda }
     }
 
@@ -136,6 +136,14 @@ impl Programs {
         self.last.as_ref().map(|(_, face)| face)
     }
 
+    /// The rows that held last, all of them in the beginning.
+    fn take_face(&mut self, coarse: &Coarse, rows: usize) -> Result<CoarseFace, Floating> {
+        match self.last.take() {
+            Some((_, face)) => Ok(face),
+            None => CoarseFace::new(coarse, vec![true; rows]),
+        }
+    }
+
     fn equalities(
         &mut self,
         problem: &TornProblem,
@@ -147,11 +155,8 @@ impl Programs {
         let space = Multipliers(problem.space, dual.timer);
         let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
         let at_floor = self.note(&limits, report.first_norm);
-        if self.last.is_none() {
-            let all = CoarseFace::new(&dual.projector.coarse, vec![true; lambda.len()])?;
-            self.last = Some((Vec::new(), all));
-        }
-        self.last.iter_mut().for_each(|(last, _)| last.clone_from(&lambda));
+        let face = self.take_face(&dual.projector.coarse, lambda.len())?;
+        self.last = Some((lambda.clone(), face));
         let (outcome, statistics) = (report.outcome, report.statistics);
         Ok(Found { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
     }
@@ -166,11 +171,7 @@ impl Programs {
     ) -> Result<Found, Floating> {
         let space = Multipliers(problem.space, dual.timer);
         let bounded: Vec<bool> = problem.constraints.rows.iter().map(|row| row.is_inequality()).collect();
-        let coarse = &dual.projector.coarse;
-        let rows = match self.last.take() {
-            Some((_, face)) => face,
-            None => CoarseFace::new(coarse, vec![true; bounded.len()])?,
-        };
+        let rows = self.take_face(&dual.projector.coarse, bounded.len())?;
         let start = active_set::Start { x: warm.lambda.clone(), residual, kept: rows.kept().to_vec() };
         dual.restrict_scaling(problem.constraints, rows.kept());
         let mut face =

@@ -115,7 +115,7 @@ impl<'a> StepSolver<'a> {
         let forces = problem.unbalance(state);
         let coarse = &self.projector.coarse;
         let warm = timer.time("coarse problem", || {
-            self.programs.start(coarse, rows, recover::resultants(problem, coarse, &forces))
+            self.programs.start(&self.projector, rows, recover::resultants(problem, coarse, &forces))
         });
         let slack = problem.slack(u);
         let mut b = vec![0.0; rows];
