@@ -6,10 +6,13 @@
 
 use std::collections::{HashMap, HashSet};
 
+use crate::assembly::internal;
 use crate::comm::{Comm, all_gather_u64};
 use crate::contact::ContactPair;
+use crate::decomposition::bricks::Boxes;
 use crate::decomposition::{BodyMesh, Subdomain};
 use crate::feti::Torn;
+use crate::material::Material;
 
 /// Displacement of the coarse mesh at the nodes of own fine subdomains. Copies of a node get the same bits, on any
 /// number of ranks. Collective.
@@ -92,6 +95,34 @@ pub fn closed_contacts(
             + coarse.brick.node(std::array::from_fn(|a| (2 * at[a] * cells.1[a] + cells.0[a]) / (2 * cells.0[a])))
     };
     fine_pairs.iter().map(|pair| closed.contains(&(pair.contact, nearest(pair.slave)))).collect()
+}
+
+/// Cost of a subdomain that yields, in those of one that is elastic and has congruent ones (10^3 cells, factorised in
+/// every step; `benches/kernels.rs`).
+const YIELDING: u64 = 8;
+
+/// What the boxes of a finer mesh are likely to cost, from where the coarse one yields. Collective.
+pub fn costs<'a>(
+    comm: &dyn Comm,
+    coarse: (&[BodyMesh], &[Subdomain], &Torn),
+    material: impl Fn(usize) -> &'a Material,
+    boxes: &Boxes,
+) -> Vec<u64> {
+    let (bodies, subdomains, u) = coarse;
+    let numbers = boxes.numbers();
+    let mut yielding = HashSet::new();
+    for (subdomain, u) in subdomains.iter().zip(u) {
+        let (body, brick) = (subdomain.body, &bodies[subdomain.body].brick);
+        for nodes in internal::yielding(subdomain, material(body), u) {
+            let centre = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>() / 4.0;
+            let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);
+            yielding.insert(numbers[body][boxes.around(body, place)] as u64);
+        }
+    }
+    let mut costs = vec![1; boxes.count()];
+    let mine: Vec<u64> = yielding.into_iter().collect();
+    all_gather_u64(comm, &mine).into_iter().for_each(|number| costs[number as usize] = YIELDING);
+    costs
 }
 
 #[cfg(test)]

@@ -294,7 +294,10 @@ fn solve_level(
     timer: &Timer,
     monitor: &mut Monitor,
 ) -> Result<(study::Discrete, study::Solved), StudyError> {
-    let discrete = timer.time("discretisation", || study::discretise(scene, comm))?;
+    let costs = coarser.as_ref().and_then(|(coarse, solved)| {
+        timer.time("interpolation", || study::expected_costs(comm, (coarse, solved), scene))
+    });
+    let discrete = timer.time("discretisation", || study::discretise_by_cost(scene, costs.as_deref(), comm))?;
     let sizes = study::sizes(&discrete, comm);
     monitor.event(&Event::Sizes { scene: source.scene.clone(), level, ranks: comm.size(), sizes });
     if level == source.level {

@@ -120,7 +120,7 @@ impl<'a> Setup<'a> {
         let mut stiffnesses = Vec::new();
         for (own, subdomain) in self.subdomains().iter().enumerate() {
             let values = elastic(subdomain, self.material(own), &factors.symbolic(own).pattern);
-            factors.factorise(own, subdomain, &values).expect("elastic bodies are stiff");
+            factors.factorise(own, subdomain, &values, false).expect("elastic bodies are stiff");
             stiffnesses.push(values);
         }
         (factors, stiffnesses)

@@ -11,17 +11,19 @@ use crate::comm::{Comm, Shares, ordered_sum};
 use crate::constraint::{ConstraintError, Constraints, Kind, Support};
 use crate::contact::surface::GatheredSurface;
 use crate::contact::{ContactError, ContactPair, matching};
+use crate::decomposition::bricks::Boxes;
+use crate::decomposition::twins::twins;
 use crate::decomposition::{self, BodyMesh, Cut, Decomposition, Surface};
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::gather::Gather;
-use crate::feti::interior::{self, InteriorFactors};
 use crate::feti::kernel::RigidModes;
 use crate::feti::operator::DualOperator;
 use crate::feti::preconditioner::{self, Preconditioner};
 use crate::feti::projector::Projector;
+use crate::feti::schur::Schur;
 use crate::feti::space::RowSpace;
 use crate::material::Material;
 use crate::mesh::{Brick, Face};
@@ -76,9 +78,16 @@ pub struct Discrete {
 /// # Errors
 /// If contacts cannot be paired or supports contradict each other.
 pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError> {
+    discretise_by_cost(scene, None, comm)
+}
+
+/// As [`discretise`], but spreads the subdomains over the ranks by their costs.
+///
+/// # Errors
+/// As there.
+pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm) -> Result<Discrete, StudyError> {
     let names: Vec<&String> = scene.body.keys().collect();
-    let brick = |b: &scene::Body| Brick { origin: b.brick.origin, size: b.brick.size, cells: b.brick.cells };
-    let bodies = decomposition::number_bodies(scene.body.values().map(brick).collect());
+    let bodies = bodies(scene);
     let materials = scene.body.values().map(|b| material(&scene.material[&b.material])).collect();
     let surface = |name: &SurfaceName| Surface {
         body: names.iter().position(|n| **n == name.body).expect("a checked scene names its bodies"),
@@ -100,7 +109,7 @@ pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError
         scene::Decomposition::Bricks { cells } => Cut::Bricks(cells),
         scene::Decomposition::Metis { subdomains } => Cut::Metis(subdomains),
     };
-    let decomposition = decomposition::tear(&bodies, &surfaces, cut, comm);
+    let decomposition = decomposition::tear(&bodies, &surfaces, cut, costs, comm);
 
     let mut pairs = Vec::new();
     for (number, (name, contact)) in scene.contact.iter().enumerate() {
@@ -121,6 +130,11 @@ pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError
     let constraints: Result<_, ConstraintError> = Constraints::new(comm, &decomposition, &supports, &pairs);
     let constraints = agree(comm, "supports", constraints).map_err(StudyError::Supports)?;
     Ok(Discrete { bodies, materials, surfaces, decomposition, pairs, supports, tractions, constraints })
+}
+
+fn bodies(scene: &Scene) -> Vec<BodyMesh> {
+    let brick = |b: &scene::Body| Brick { origin: b.brick.origin, size: b.brick.size, cells: b.brick.cells };
+    decomposition::number_bodies(scene.body.values().map(brick).collect())
 }
 
 fn material(m: &scene::Material) -> Material {
@@ -208,6 +222,17 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
     newton::Start { u, held: fine.constraints.rows.iter().map(|row| held(row.kind)).collect() }
 }
 
+/// What the subdomains of a finer mesh are likely to cost, from where a solved scene yields. `None` if they are not known
+/// before the mesh is cut. Collective.
+pub fn expected_costs(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<u64>> {
+    let scene::Decomposition::Bricks { cells } = fine.decomposition else { return None };
+    let (coarse, solved) = coarse;
+    let bodies = bodies(fine);
+    let boxes = Boxes::new(&bodies, cells);
+    let material = |body: usize| &coarse.materials[body];
+    Some(cascade::costs(comm, (&coarse.bodies, &coarse.decomposition.subdomains, &solved.u), material, &boxes))
+}
+
 /// Solves a discretised scene, from rest or from a start; `report` is told what happens. Collective.
 ///
 /// # Errors
@@ -232,16 +257,14 @@ pub fn solve(
         scene::Precision::Mixed => Precision::Single,
         scene::Precision::Double => Precision::Double,
     };
-    let interior = || {
+    let schur = |precision| {
         let boundaries = preconditioner::boundaries(&gather, subdomains.len());
-        InteriorFactors::new(interior::analyse(&symbolic, boundaries), precision)
+        timer.time("symbolic analysis", || Schur::new(&symbolic, boundaries, precision))
     };
     let preconditioner = match scene.solver.preconditioner {
         scene::Preconditioner::None => None,
-        scene::Preconditioner::Lumped => Some(Preconditioner::new(&gather, None)),
-        scene::Preconditioner::Dirichlet => {
-            Some(Preconditioner::new(&gather, Some(timer.time("symbolic analysis", interior))))
-        }
+        scene::Preconditioner::Lumped => Some(Preconditioner::new(&gather, schur(None))),
+        scene::Preconditioner::Dirichlet => Some(Preconditioner::new(&gather, schur(Some(precision)))),
     };
     let mut loads = gather.zeros();
     for (subdomain, f) in subdomains.iter().zip(&mut loads) {
@@ -270,7 +293,7 @@ pub fn solve(
         limit: solver.newton_limit,
     };
     let operator = DualOperator::new(Factors::new(symbolic, precision), &gather);
-    let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, subdomains.len());
+    let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, twins(comm, subdomains));
     let report = RefCell::new(report);
     let alive = |step, applications| {
         report.borrow_mut()(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });

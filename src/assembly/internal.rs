@@ -47,7 +47,7 @@ pub fn add_forces(subdomain: &Subdomain, material: &Material, u: &[f64], forces:
     let modulus = material.lambda() + 2.0 * material.shear_modulus();
     let mut sum = Internal::default();
     for nodes in &subdomain.elements {
-        let element = geometry(subdomain, nodes);
+        let element = geometry(&subdomain.points, nodes);
         let u = displacements(u, nodes);
         sum.terms.add(&element, modulus, &u);
         let response = material.respond(&element.strain(&u), &rest);
@@ -62,12 +62,24 @@ pub fn add_forces(subdomain: &Subdomain, material: &Material, u: &[f64], forces:
     sum
 }
 
+/// The elements that yield at `u`, one step from rest, by their nodes.
+pub fn yielding<'a>(
+    subdomain: &'a Subdomain,
+    material: &'a Material,
+    u: &'a [f64],
+) -> impl Iterator<Item = &'a [u32; 4]> {
+    subdomain.elements.iter().filter(move |nodes| {
+        let element = geometry(&subdomain.points, nodes);
+        material.respond(&element.strain(&displacements(u, nodes)), &History::default()).plastic
+    })
+}
+
 /// `v'K_e v` of each vector (energy).
 pub fn elastic_squares<const N: usize>(subdomain: &Subdomain, material: &Material, vectors: [&[f64]; N]) -> [f64; N] {
     let tangent = material.elastic_tangent();
     let mut squares = [0.0; N];
     for nodes in &subdomain.elements {
-        let element = geometry(subdomain, nodes);
+        let element = geometry(&subdomain.points, nodes);
         for (square, v) in squares.iter_mut().zip(vectors) {
             let strain: Voigt = element.strain(&displacements(v, nodes));
             *square += element.volume * contract(&apply(&tangent, &strain), &strain);

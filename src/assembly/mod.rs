@@ -7,12 +7,11 @@ pub mod loads;
 pub mod pattern;
 pub mod stiffness;
 
-use crate::decomposition::Subdomain;
 use crate::element::tet4::Tet4;
 
-/// Geometry of an element. Cut and mesh were checked before: elements are sound here.
-fn geometry(subdomain: &Subdomain, nodes: &[u32; 4]) -> Tet4 {
-    Tet4::new(&nodes.map(|n| subdomain.points[n as usize])).expect("elements of a checked mesh have volume")
+/// Geometry of an element of a mesh with these points. Cut and mesh were checked before: elements are sound here.
+fn geometry(points: &[[f64; 3]], nodes: &[u32; 4]) -> Tet4 {
+    Tet4::new(&nodes.map(|n| points[n as usize])).expect("elements of a checked mesh have volume")
 }
 
 /// Nodal displacements of an element.

@@ -13,7 +13,7 @@ pub fn assemble(subdomain: &Subdomain, material: &Material, u: &[f64], pattern: 
     let rest = History::default();
     let mut plastic = 0;
     for nodes in &subdomain.elements {
-        let element = geometry(subdomain, nodes);
+        let element = geometry(&subdomain.shape, nodes);
         let strain = element.strain(&displacements(u, nodes));
         let k = if material.respond(&strain, &rest).plastic {
             plastic += 1;

@@ -7,7 +7,8 @@ use metis::Graph;
 use metis::option::{Contig, Seed};
 
 use super::connectivity::split_into_pieces;
-use super::{BodyMesh, ElementList, even_shares};
+use super::shares::{by_cost, interleave};
+use super::{BodyMesh, ElementList};
 use crate::comm::{Comm, Shares};
 
 /// Cuts all bodies into about `parts` parts (more where a part had to be split to be face-connected). Returns the
@@ -16,21 +17,21 @@ pub(crate) fn own_elements(bodies: &[BodyMesh], parts: usize, comm: &dyn Comm) -
     let mut outgoing = vec![Vec::new(); comm.size()];
     if comm.rank() == 0 {
         let sizes: Vec<u64> = bodies.iter().map(|body| body.brick.element_count()).collect();
-        let mut lists: Vec<ElementList> = Vec::new();
-        for (index, (body, wanted)) in bodies.iter().zip(spread(parts, &sizes)).enumerate() {
+        let mut lists: Vec<Vec<Vec<u64>>> = Vec::new();
+        for (body, wanted) in bodies.iter().zip(spread(parts, &sizes)) {
             let (part, count) = partition(body, wanted);
-            let first = lists.len();
-            lists.extend((0..count).map(|_| (index, Vec::new())));
-            for (element, &p) in part.iter().enumerate() {
-                lists[first + p as usize].1.push(element as u64);
-            }
+            let mut of_parts = vec![Vec::new(); count];
+            part.iter().enumerate().for_each(|(element, &p)| of_parts[p as usize].push(element as u64));
+            lists.push(of_parts);
         }
-        let shares = even_shares(lists.len(), comm.size());
-        let mut lists = lists.into_iter();
+        let order = interleave(&lists.iter().map(Vec::len).collect::<Vec<_>>());
+        let costs: Vec<u64> = order.iter().map(|&(body, part)| lists[body][part].len() as u64).collect();
+        let shares = by_cost(&costs, comm.size());
+        let mut order = order.into_iter();
         for (message, &count) in outgoing.iter_mut().zip(&shares.0) {
-            for (body, elements) in lists.by_ref().take(count) {
-                message.extend([body as u64, elements.len() as u64]);
-                message.extend(elements);
+            for (body, part) in order.by_ref().take(count) {
+                message.extend([body as u64, lists[body][part].len() as u64]);
+                message.extend(&lists[body][part]);
             }
         }
     }

@@ -8,7 +8,9 @@ pub mod bricks;
 pub mod connectivity;
 pub mod interface;
 pub mod metis;
+pub mod shares;
 pub mod subdomain;
+pub mod twins;
 
 pub use interface::InterfaceNode;
 pub use subdomain::{Facet, Subdomain};
@@ -85,10 +87,17 @@ pub fn number_bodies(bricks: Vec<Brick>) -> Vec<BodyMesh> {
         .collect()
 }
 
-/// Tears the bodies; facets and interface nodes refer to `surfaces` by index. Collective.
-pub fn tear(bodies: &[BodyMesh], surfaces: &[Surface], cut: Cut, comm: &dyn Comm) -> Decomposition {
+/// Tears the bodies; facets and interface nodes refer to `surfaces` by index. Boxes of [`Cut::Bricks`] are spread over the
+/// ranks by their `costs` if given, otherwise every rank gets as many subdomains. Collective.
+pub fn tear(
+    bodies: &[BodyMesh],
+    surfaces: &[Surface],
+    cut: Cut,
+    costs: Option<&[u64]>,
+    comm: &dyn Comm,
+) -> Decomposition {
     let (shares, lists) = match cut {
-        Cut::Bricks(cells) => bricks::own_elements(bodies, cells, comm),
+        Cut::Bricks(cells) => bricks::own_elements(bodies, cells, costs, comm),
         Cut::Metis(parts) => metis::own_elements(bodies, parts, comm),
     };
     let first = shares.begin(comm.rank());
@@ -99,11 +108,6 @@ pub fn tear(bodies: &[BodyMesh], surfaces: &[Surface], cut: Cut, comm: &dyn Comm
         .collect();
     let interface = interface::share(comm, &subdomains);
     Decomposition { shares, subdomains, interface }
-}
-
-/// Consecutive blocks of `items` over `ranks`, sizes as equal as possible; ranks beyond the items stay idle.
-pub fn even_shares(items: usize, ranks: usize) -> Shares {
-    Shares((0..ranks).map(|rank| items / ranks + usize::from(rank < items % ranks)).collect())
 }
 
 /// Elements of one subdomain: its body, and the numbers of its elements within the body, ascending.

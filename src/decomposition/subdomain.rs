@@ -23,6 +23,9 @@ pub struct Subdomain {
     pub nodes: Vec<u64>,
     /// Coordinates of the local nodes.
     pub points: Vec<[f64; 3]>,
+    /// Coordinates relative to the first node: congruent boxes have the same bits here, and so has what is computed
+    /// from them alone.
+    pub shape: Vec<[f64; 3]>,
     /// Local nodes of each element.
     pub elements: Vec<[u32; 4]>,
     /// Triangles on named surfaces.
@@ -44,6 +47,7 @@ impl Subdomain {
         nodes.dedup();
         let local = |node: u64| nodes.binary_search(&node).expect("every corner is listed") as u32;
         let points = nodes.iter().map(|&node| brick.coordinates(brick.node_position(node))).collect();
+        let shape = nodes.iter().map(|&node| brick.way(nodes[0], node)).collect();
         let elements: Vec<[u32; 4]> = tets.iter().map(|tet| tet.map(local)).collect();
 
         let mut outer = outer_faces(&elements);
@@ -61,7 +65,7 @@ impl Subdomain {
             })
             .collect();
         let nodes = nodes.iter().map(|node| body.first_node + node).collect();
-        Self { id, body: body_index, nodes, points, elements, facets, boundary }
+        Self { id, body: body_index, nodes, points, shape, elements, facets, boundary }
     }
 
     /// Number of local unknowns.

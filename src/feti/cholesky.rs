@@ -15,6 +15,7 @@ use faer::traits::RealField;
 use faer::{Par, Side, Spec};
 
 use super::supernodes;
+pub use super::supernodes::WIDTH;
 
 /// Sparsity of a symmetric matrix: its lower triangle by columns, rows ascending.
 #[derive(Clone, Copy)]
@@ -116,6 +117,8 @@ pub struct Workspace {
     double: Vec<f64>,
     /// The unknowns that one supernode touches.
     panels: (Vec<f32>, Vec<f64>),
+    /// The same two for several right-hand sides, in single and in double precision.
+    wide: ([Vec<[f32; WIDTH]>; 2], [Vec<[f64; WIDTH]>; 2]),
 }
 
 impl Workspace {
@@ -124,7 +127,13 @@ impl Workspace {
         let request =
             |Analysis(symbolic): &Analysis| symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
         let request = analyses.into_iter().map(request).fold(StackReq::EMPTY, StackReq::or);
-        Self { buffer: MemBuffer::new(request), single: Vec::new(), double: Vec::new(), panels: Default::default() }
+        Self {
+            buffer: MemBuffer::new(request),
+            single: Vec::new(),
+            double: Vec::new(),
+            panels: Default::default(),
+            wide: Default::default(),
+        }
     }
 
     /// Overwrites `factor` by the factor of the matrix with these lower values.
@@ -169,6 +178,34 @@ impl Workspace {
                 self.single.extend(order.iter().map(|&k| (x[k as usize] / scale) as f32));
                 supernodes::solve(panels, factor, &mut self.single, &mut self.panels.0);
                 order.iter().zip(&self.single).for_each(|(&k, &y)| x[k as usize] = scale * f64::from(y));
+            }
+        }
+    }
+
+    /// `x = A^-1 x` for [`WIDTH`] vectors, `WIDTH` numbers an unknown. Each gets the bits that it would get beside others.
+    pub fn solve_wide(&mut self, Analysis(symbolic): &Analysis, factor: &Factor, x: &mut [f64]) {
+        let (SymbolicCholeskyRaw::Supernodal(panels), Some(order)) = (symbolic.raw(), symbolic.perm()) else { return };
+        let (order, (x, _)) = (order.arrays().0, x.as_chunks_mut::<WIDTH>());
+        match factor {
+            Factor::Double(factor) => {
+                let [unknowns, panel] = &mut self.wide.1;
+                unknowns.clear();
+                unknowns.extend(order.iter().map(|&k| x[k as usize]));
+                supernodes::solve_wide(panels, factor, unknowns, panel);
+                order.iter().zip(&*unknowns).for_each(|(&k, y)| x[k as usize] = *y);
+            }
+            Factor::Single(factor) => {
+                let [unknowns, panel] = &mut self.wide.0;
+                let mut largest = [0.0_f64; WIDTH];
+                x.iter().for_each(|x| (0..WIDTH).for_each(|l| largest[l] = largest[l].max(x[l].abs())));
+                let scale = largest.map(|m| if m > 0.0 { m } else { 1.0 });
+                let single = |x: &[f64; WIDTH]| std::array::from_fn(|l| (x[l] / scale[l]) as f32);
+                unknowns.clear();
+                unknowns.extend(order.iter().map(|&k| single(&x[k as usize])));
+                supernodes::solve_wide(panels, factor, unknowns, panel);
+                for (&k, y) in order.iter().zip(&*unknowns) {
+                    x[k as usize] = std::array::from_fn(|l| scale[l] * f64::from(y[l]));
+                }
             }
         }
     }

@@ -8,9 +8,11 @@ use std::rc::Rc;
 
 use thiserror::Error;
 
-use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
+use super::Torn;
+use super::cholesky::{Analysis, Factor, Lower, Precision, WIDTH, Workspace};
 use super::kernel::RigidModes;
 use super::ordering::nested_dissection;
+use super::stock::{Batch, Stock};
 use crate::assembly::pattern::Pattern;
 use crate::decomposition::Subdomain;
 
@@ -48,7 +50,7 @@ pub struct Symbolic {
 impl Symbolic {
     /// Analyses a subdomain.
     pub fn new(subdomain: &Subdomain) -> Self {
-        let fixing = fixing_nodes(&subdomain.points);
+        let fixing = fixing_nodes(&subdomain.shape);
         let pattern = Pattern::new(subdomain.nodes.len(), &subdomain.elements, &fixing);
         let order = nested_dissection(&pattern.adjacency);
         let cholesky = Analysis::ordered(lower(&pattern), &order);
@@ -57,7 +59,7 @@ impl Symbolic {
 
     /// Whether a subdomain may share this analysis.
     fn fits(&self, subdomain: &Subdomain, of: &Subdomain) -> bool {
-        subdomain.elements == of.elements && fixing_nodes(&subdomain.points) == self.fixing
+        subdomain.elements == of.elements && fixing_nodes(&subdomain.shape) == self.fixing
     }
 
     /// Numbers in the factor.
@@ -90,7 +92,7 @@ pub fn analyse(subdomains: &[Subdomain]) -> Vec<Rc<Symbolic>> {
 /// Numeric factors of all own subdomains.
 pub struct Factors {
     symbolic: Vec<Rc<Symbolic>>,
-    factors: Vec<Factor>,
+    factors: Stock<Factor>,
     precision: Precision,
     workspace: Workspace,
     shifted: Vec<f64>,
@@ -100,12 +102,12 @@ impl Factors {
     /// Space for the factors; nothing is factorised yet. Of single precision are those that pass a probe.
     pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
-        let factors = symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)).collect();
+        let factors = Stock::new(symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)));
         Self { symbolic, factors, precision, workspace, shifted: Vec::new() }
     }
 
     /// Symbolic analysis of an own subdomain.
-    pub fn symbolic(&self, own: usize) -> &Symbolic {
+    pub fn symbolic(&self, own: usize) -> &Rc<Symbolic> {
         &self.symbolic[own]
     }
 
@@ -119,23 +121,30 @@ impl Factors {
         self.precision = precision;
     }
 
-    /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`.
+    /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`; `common` says that it has
+    /// twins, here or on other ranks.
     ///
     /// # Errors
     /// If the matrix is not positive definite, or not finite.
-    pub fn factorise(&mut self, own: usize, subdomain: &Subdomain, stiffness: &[f64]) -> Result<(), NotDefinite> {
+    pub fn factorise(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        stiffness: &[f64],
+        common: bool,
+    ) -> Result<(), NotDefinite> {
         let Symbolic { pattern, fixing, cholesky, .. } = &*self.symbolic[own];
         let n = pattern.dofs();
         self.shifted.clear();
         self.shifted.extend_from_slice(stiffness);
         let diagonal = pattern.diagonal(stiffness);
         let rho = diagonal.iter().sum::<f64>() / n as f64;
-        add_fixing(pattern, fixing, &subdomain.points, rho, &mut self.shifted);
+        add_fixing(pattern, fixing, &subdomain.shape, rho, &mut self.shifted);
         let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
         if !rho.is_finite() {
             return Err(refuse(0));
         }
-        let factor = &mut self.factors[own];
+        let factor = self.factors.renew(own, common, || Factor::new(cholesky, self.precision));
         if factor.precision() != self.precision {
             *factor = Factor::new(cholesky, self.precision);
         }
@@ -151,9 +160,32 @@ impl Factors {
         Ok(())
     }
 
-    /// `x = K^+ x` for one own subdomain.
-    pub fn solve(&mut self, own: usize, x: &mut [f64]) {
-        self.workspace.solve(&self.symbolic[own].cholesky, &self.factors[own], x);
+    /// From now on an own subdomain has the factor of a congruent one with equal stiffness.
+    pub fn share(&mut self, own: usize, twin: usize) {
+        self.factors.share(own, twin);
+    }
+
+    /// `x = K^+ x`, subdomain by subdomain.
+    pub fn solve(&mut self, x: &mut Torn) {
+        for batch in self.factors.batches() {
+            match batch {
+                &Batch::Alone(own) => {
+                    self.workspace.solve(&self.symbolic[own].cholesky, self.factors.of(own), &mut x[own]);
+                }
+                Batch::Twins(twins) => {
+                    let first = twins[0];
+                    let mut panel = vec![[0.0; WIDTH]; x[first].len()];
+                    for (lane, &own) in twins.iter().enumerate() {
+                        panel.iter_mut().zip(&x[own]).for_each(|(panel, x)| panel[lane] = *x);
+                    }
+                    let cholesky = &self.symbolic[first].cholesky;
+                    self.workspace.solve_wide(cholesky, self.factors.of(first), panel.as_flattened_mut());
+                    for (lane, &own) in twins.iter().enumerate() {
+                        x[own].iter_mut().zip(&panel).for_each(|(x, panel)| *x = panel[lane]);
+                    }
+                }
+            }
+        }
     }
 }
 

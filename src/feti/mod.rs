@@ -8,14 +8,15 @@ pub mod coarse;
 pub mod face;
 pub mod factor;
 pub mod gather;
-pub mod interior;
 pub mod kernel;
 pub mod operator;
 pub mod ordering;
 pub mod preconditioner;
 pub mod projector;
 pub mod scaling;
+pub mod schur;
 pub mod space;
+pub mod stock;
 mod supernodes;
 
 /// A torn vector: for each own subdomain its local unknowns.

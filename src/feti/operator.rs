@@ -25,18 +25,16 @@ impl<'a> DualOperator<'a> {
         for (own, local) in self.torn.iter_mut().enumerate() {
             local.fill(0.0);
             self.gather.add_transpose_one(own, 1.0, x, local);
-            self.factors.solve(own, local);
         }
+        self.factors.solve(&mut self.torn);
         self.gather.apply(&self.torn, y);
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`: costs and counts as one application of F.
     pub fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64]) {
         self.applications += 1;
-        for (own, local) in torn.iter_mut().enumerate() {
-            self.gather.add_transpose_one(own, -1.0, x, local);
-            self.factors.solve(own, local);
-        }
+        self.gather.add_transpose(-1.0, x, torn);
+        self.factors.solve(torn);
         self.gather.apply(torn, y);
     }
 

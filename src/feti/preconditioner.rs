@@ -3,19 +3,20 @@
 
 use super::Torn;
 use super::gather::Gather;
-use super::interior::InteriorFactors;
 use super::scaling::Scaling;
-use crate::assembly::pattern::Pattern;
+use super::schur::Schur;
 
 /// Approximate inverse of `F`; counts its applications.
 pub struct Preconditioner<'a> {
     gather: &'a Gather<'a>,
-    /// Interior factors of the Dirichlet preconditioner; none for the lumped one.
-    pub interior: Option<InteriorFactors>,
+    /// `S`; updated by the caller before the first application, and when tangents change.
+    pub schur: Schur,
     /// Scaling of the rows; set by the caller before the first application, and when tangents or rows change.
     pub scaling: Scaling,
-    /// Local unknowns that rows touch, for each own subdomain.
-    boundary: Vec<Vec<u32>>,
+    /// Place among the boundary unknowns of each own subdomain's coefficients, in the order of the rows.
+    places: Vec<Vec<u32>>,
+    displacements: Vec<Vec<f64>>,
+    forces: Vec<Vec<f64>>,
     torn: Torn,
     rows: Vec<f64>,
     applications: usize,
@@ -34,59 +35,59 @@ pub fn boundaries(gather: &Gather, own: usize) -> Vec<Vec<u32>> {
 }
 
 impl<'a> Preconditioner<'a> {
-    /// Dirichlet with interior factors, lumped without.
-    pub fn new(gather: &'a Gather<'a>, interior: Option<InteriorFactors>) -> Self {
+    /// With the boundary stiffness on the [`boundaries`] of the same `gather`.
+    pub fn new(gather: &'a Gather<'a>, schur: Schur) -> Self {
         let torn = gather.zeros();
-        let boundary = boundaries(gather, torn.len());
+        let place = |own: usize, dof| schur.boundary(own).binary_search(&dof).expect("rows touch boundary unknowns");
+        let places = (0..torn.len())
+            .map(|own| gather.entries(own).iter().map(|entry| place(own, entry.dof) as u32).collect())
+            .collect();
+        let displacements: Vec<_> = (0..torn.len()).map(|own| vec![0.0; schur.boundary(own).len()]).collect();
         Self {
             gather,
-            interior,
+            schur,
             scaling: Scaling::default(),
-            boundary,
-            rows: vec![0.0; gather.rows()],
+            places,
+            forces: displacements.clone(),
+            displacements,
             torn,
+            rows: vec![0.0; gather.rows()],
             applications: 0,
         }
     }
 
-    /// `y = B_D S B_D' x`, `stiffness(own)` being the sparsity and the lower values. One neighbour exchange.
-    pub fn apply<'k>(&mut self, stiffness: impl Fn(usize) -> (&'k Pattern, &'k [f64]), x: &[f64], y: &mut [f64]) {
+    /// `y = B_D S B_D' x`. One neighbour exchange.
+    pub fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.applications += 1;
-        self.scaling.solve(x, &mut self.rows);
-        for own in 0..self.torn.len() {
-            let (pattern, values) = stiffness(own);
-            let flexibility = &self.scaling.flexibility[own];
-            let mut t = vec![0.0; pattern.dofs()];
-            self.gather.add_transpose_one(own, 1.0, &self.rows, &mut t);
-            t.iter_mut().zip(flexibility).for_each(|(t, f)| *t *= f);
-            let mut forces = vec![0.0; t.len()];
-            if let Some(factors) = &mut self.interior {
-                factors.extend(own, pattern, values, &mut t);
-            }
-            pattern.multiply_add(values, &t, &mut forces);
-            let out = &mut self.torn[own];
-            out.fill(0.0);
-            for &dof in &self.boundary[own] {
-                out[dof as usize] = flexibility[dof as usize] * forces[dof as usize];
+        self.displace(x);
+        self.schur.apply(&self.displacements, &mut self.forces);
+        for (own, torn) in self.torn.iter_mut().enumerate() {
+            // Only boundary unknowns are read.
+            for (&dof, force) in self.schur.boundary(own).iter().zip(&self.forces[own]) {
+                torn[dof as usize] = self.scaling.flexibility[own][dof as usize] * force;
             }
         }
         self.gather.apply(&self.torn, &mut self.rows);
         self.scaling.solve(&self.rows, y);
     }
 
-    /// Adds to a torn displacement what closes the rows' `defect = c - B u`: `B_D' defect` on the boundary and, with
-    /// interior factors, the interior that follows it without force. Local.
-    pub fn mend<'k>(&mut self, stiffness: impl Fn(usize) -> (&'k Pattern, &'k [f64]), defect: &[f64], u: &mut Torn) {
-        self.scaling.solve(defect, &mut self.rows);
-        for (own, u) in u.iter_mut().enumerate() {
-            let (pattern, values) = stiffness(own);
-            let mut t = vec![0.0; u.len()];
-            self.gather.add_transpose_one(own, 1.0, &self.rows, &mut t);
-            t.iter_mut().zip(&self.scaling.flexibility[own]).for_each(|(t, f)| *t *= f);
-            if let Some(factors) = &mut self.interior {
-                factors.extend(own, pattern, values, &mut t);
+    /// Adds to a torn displacement what closes the rows' `defect = c - B u`: `B_D' defect` on the boundary and, for
+    /// Dirichlet, the interior that follows it without force. Local.
+    pub fn mend(&mut self, defect: &[f64], u: &mut Torn) {
+        self.displace(defect);
+        self.schur.extend(&self.displacements, u);
+    }
+
+    /// `B_D' x` on the boundaries.
+    fn displace(&mut self, x: &[f64]) {
+        self.scaling.solve(x, &mut self.rows);
+        for (own, t) in self.displacements.iter_mut().enumerate() {
+            t.fill(0.0);
+            for (entry, &place) in self.gather.entries(own).iter().zip(&self.places[own]) {
+                t[place as usize] += entry.value * self.rows[entry.row as usize];
             }
-            u.iter_mut().zip(&t).for_each(|(u, t)| *u += t);
+            let flexibility = &self.scaling.flexibility[own];
+            t.iter_mut().zip(self.schur.boundary(own)).for_each(|(t, &dof)| *t *= flexibility[dof as usize]);
         }
     }
 

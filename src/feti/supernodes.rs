@@ -1,9 +1,10 @@
-//! Solves with one right-hand side through the supernodes of a Cholesky factor, at the speed at which the factor can be
-//! read.
+//! Solves with one right-hand side, or with [`WIDTH`], through the supernodes of a Cholesky factor, at the speed at which
+//! the factor can be read.
 //!
 //! A supernode is a dense panel, column by column: a lower triangle and the rows below it. [`COLUMNS`] columns at a
-//! time are read once, against a copy of the unknowns that the panel touches and that stays in cache. (The general
-//! kernels of faer are made for many right-hand sides.)
+//! time are read once, against a copy of the unknowns that the panel touches and that stays in cache. Of several
+//! right-hand sides each does exactly what it would do beside any others. (The general kernels of faer are made for
+//! many right-hand sides.)
 
 use std::ops::{Add, Div, Neg, Sub};
 
@@ -12,28 +13,92 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// Columns of a panel that are read together.
 const COLUMNS: usize = 4;
-/// Partial sums of an inner product.
-const LANES: usize = 8;
+/// Right-hand sides that are solved together, and partial sums of an inner product.
+pub const WIDTH: usize = 8;
+
+/// One unknown of several right-hand sides, or several unknowns of one.
+type Wide<T> = [T; WIDTH];
 
 /// What a factor's numbers are.
 pub(super) trait Number:
     Copy + Default + Add<Output = Self> + Sub<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
+    /// Several numbers that the machine handles at a time: [`WIDTH`], or a part of them.
+    type Vector<S: Simd>: Copy;
+
     /// `self * a + b`, rounded once.
     fn fused(self, a: Self, b: Self) -> Self;
+
+    /// A vector of this number.
+    fn all<S: Simd>(self, simd: S) -> Self::Vector<S>;
+
+    /// `x * y + z`, rounded once.
+    fn add_product<S: Simd>(simd: S, x: Self::Vector<S>, y: Self::Vector<S>, z: Self::Vector<S>) -> Self::Vector<S>;
+
+    /// The vectors that a machine without a vector of [`WIDTH`] numbers has to take instead.
+    fn parts<S: Simd>(x: &Wide<Self>) -> &[Self::Vector<S>];
+
+    /// The same, to be overwritten.
+    fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [Self::Vector<S>];
 }
 
 impl Number for f32 {
+    type Vector<S: Simd> = S::f32s;
+
     #[inline(always)]
     fn fused(self, a: Self, b: Self) -> Self {
         self.mul_add(a, b)
     }
+
+    #[inline(always)]
+    fn all<S: Simd>(self, simd: S) -> S::f32s {
+        simd.splat_f32s(self)
+    }
+
+    #[inline(always)]
+    fn add_product<S: Simd>(simd: S, x: S::f32s, y: S::f32s, z: S::f32s) -> S::f32s {
+        simd.mul_add_f32s(x, y, z)
+    }
+
+    #[inline(always)]
+    fn parts<S: Simd>(x: &Wide<Self>) -> &[S::f32s] {
+        const { assert!(WIDTH % S::F32_LANES == 0) };
+        S::as_simd_f32s(x).0
+    }
+
+    #[inline(always)]
+    fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [S::f32s] {
+        S::as_mut_simd_f32s(x).0
+    }
 }
 
 impl Number for f64 {
+    type Vector<S: Simd> = S::f64s;
+
     #[inline(always)]
     fn fused(self, a: Self, b: Self) -> Self {
         self.mul_add(a, b)
+    }
+
+    #[inline(always)]
+    fn all<S: Simd>(self, simd: S) -> S::f64s {
+        simd.splat_f64s(self)
+    }
+
+    #[inline(always)]
+    fn add_product<S: Simd>(simd: S, x: S::f64s, y: S::f64s, z: S::f64s) -> S::f64s {
+        simd.mul_add_f64s(x, y, z)
+    }
+
+    #[inline(always)]
+    fn parts<S: Simd>(x: &Wide<Self>) -> &[S::f64s] {
+        const { assert!(WIDTH % S::F64_LANES == 0) };
+        S::as_simd_f64s(x).0
+    }
+
+    #[inline(always)]
+    fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [S::f64s] {
+        S::as_mut_simd_f64s(x).0
     }
 }
 
@@ -58,13 +123,45 @@ impl<T: Number> WithSimd for Solve<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { symbolic, values, x, panel } = self;
         for s in 0..symbolic.n_supernodes() {
-            forward(&Supernode::of(symbolic, values, s), x, panel);
+            forward(simd, &Supernode::of(symbolic, values, s), x, panel);
         }
         for s in (0..symbolic.n_supernodes()).rev() {
-            backward(&Supernode::of(symbolic, values, s), x, panel);
+            backward(simd, &Supernode::of(symbolic, values, s), x, panel);
+        }
+    }
+}
+
+/// `x = (L L')^-1 x` for several right-hand sides, unknown by unknown; `panel` is scratch.
+pub(super) fn solve_wide<T: Number>(
+    symbolic: &SymbolicSupernodalCholesky<u32>,
+    values: &[T],
+    x: &mut [Wide<T>],
+    panel: &mut Vec<Wide<T>>,
+) {
+    Arch::new().dispatch(SolveWide { symbolic, values, x, panel });
+}
+
+struct SolveWide<'a, T> {
+    symbolic: &'a SymbolicSupernodalCholesky<u32>,
+    values: &'a [T],
+    x: &'a mut [Wide<T>],
+    panel: &'a mut Vec<Wide<T>>,
+}
+
+impl<T: Number> WithSimd for SolveWide<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { symbolic, values, x, panel } = self;
+        for s in 0..symbolic.n_supernodes() {
+            forward_wide(simd, &Supernode::of(symbolic, values, s), x, panel);
+        }
+        for s in (0..symbolic.n_supernodes()).rev() {
+            backward_wide(simd, &Supernode::of(symbolic, values, s), x, panel);
         }
     }
 }
@@ -119,7 +216,7 @@ impl<'a, T: Number> Supernode<'a, T> {
 
 /// `x = L_s^-1 x` for the unknowns of a supernode, and what that means for the rows below.
 #[inline(always)]
-fn forward<T: Number>(node: &Supernode<T>, x: &mut [T], panel: &mut Vec<T>) {
+fn forward<T: Number, S: Simd>(simd: S, node: &Supernode<T>, x: &mut [T], panel: &mut Vec<T>) {
     panel.clear();
     panel.extend_from_slice(&x[node.begin..node.begin + node.width]);
     panel.extend(node.below.iter().map(|&row| x[row as usize]));
@@ -138,7 +235,7 @@ fn forward<T: Number>(node: &Supernode<T>, x: &mut [T], panel: &mut Vec<T>) {
         let (solved, rest) = panel.split_at_mut(at + count);
         if count == COLUMNS {
             let column = |k| node.column(at + k, at + count);
-            subtract(rest, [column(0), column(1), column(2), column(3)], &solved[at..]);
+            subtract(simd, rest, [column(0), column(1), column(2), column(3)], &solved[at..]);
         } else {
             for (k, &value) in solved[at..].iter().enumerate() {
                 for (y, &l) in rest.iter_mut().zip(node.column(at + k, at + count)) {
@@ -156,7 +253,7 @@ fn forward<T: Number>(node: &Supernode<T>, x: &mut [T], panel: &mut Vec<T>) {
 
 /// `x = L_s^-T x` for the unknowns of a supernode, the rows below being solved.
 #[inline(always)]
-fn backward<T: Number>(node: &Supernode<T>, x: &mut [T], panel: &mut Vec<T>) {
+fn backward<T: Number, S: Simd>(simd: S, node: &Supernode<T>, x: &mut [T], panel: &mut Vec<T>) {
     panel.clear();
     panel.extend_from_slice(&x[node.begin..node.begin + node.width]);
     panel.extend(node.below.iter().map(|&row| x[row as usize]));
@@ -169,11 +266,11 @@ fn backward<T: Number>(node: &Supernode<T>, x: &mut [T], panel: &mut Vec<T>) {
         let (head, rest) = panel.split_at_mut(end);
         if count == COLUMNS {
             let columns: [&[T]; COLUMNS] = std::array::from_fn(|k| &node.column(at + k, end)[..rest.len()]);
-            let sums = products(columns, rest);
+            let sums = products(simd, columns, rest);
             (0..COLUMNS).for_each(|k| head[at + k] = head[at + k] - sums[k]);
         } else {
             for k in 0..count {
-                let sum = products([node.column(at + k, end)], rest)[0];
+                let sum = products(simd, [node.column(at + k, end)], rest)[0];
                 head[at + k] = head[at + k] - sum;
             }
         }
@@ -192,32 +289,141 @@ fn backward<T: Number>(node: &Supernode<T>, x: &mut [T], panel: &mut Vec<T>) {
 
 /// `y -= columns x`.
 #[inline(always)]
-fn subtract<T: Number>(y: &mut [T], [a, b, c, d]: [&[T]; COLUMNS], x: &[T]) {
-    let (p, q, r, s) = (-x[0], -x[1], -x[2], -x[3]);
-    for ((((y, &a), &b), &c), &d) in y.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        *y = d.fused(s, c.fused(r, b.fused(q, a.fused(p, *y))));
+fn subtract<T: Number, S: Simd>(simd: S, y: &mut [T], columns: [&[T]; COLUMNS], x: &[T]) {
+    let whole = y.len() / WIDTH * WIDTH;
+    let (chunks, rest) = y.as_chunks_mut::<WIDTH>();
+    let [a, b, c, d] = columns.map(|column| column[..whole].as_chunks::<WIDTH>().0);
+    let x: [T; COLUMNS] = std::array::from_fn(|k| -x[k]);
+    let [p, q, r, s] = x.map(|x| x.all(simd));
+    for ((((y, a), b), c), d) in chunks.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        let [a, b, c, d] = [a, b, c, d].map(T::parts::<S>);
+        for (v, y) in T::parts_mut::<S>(y).iter_mut().enumerate() {
+            let sum = T::add_product(simd, b[v], q, T::add_product(simd, a[v], p, *y));
+            *y = T::add_product(simd, d[v], s, T::add_product(simd, c[v], r, sum));
+        }
+    }
+    for (i, y) in rest.iter_mut().enumerate() {
+        *y = (0..COLUMNS).fold(*y, |y, k| columns[k][whole + i].fused(x[k], y));
     }
 }
 
 /// Inner products of columns with one vector.
 #[inline(always)]
-fn products<T: Number, const N: usize>(columns: [&[T]; N], y: &[T]) -> [T; N] {
-    let mut sums = [[T::default(); LANES]; N];
-    let whole = y.len() / LANES * LANES;
-    for i in (0..whole).step_by(LANES) {
-        let y: &[T; LANES] = y[i..i + LANES].try_into().expect("a whole chunk");
-        for k in 0..N {
-            let column: &[T; LANES] = columns[k][i..i + LANES].try_into().expect("a whole chunk");
-            for l in 0..LANES {
-                sums[k][l] = column[l].fused(y[l], sums[k][l]);
+fn products<T: Number, S: Simd, const N: usize>(simd: S, columns: [&[T]; N], y: &[T]) -> [T; N] {
+    let mut sums = [[T::default(); WIDTH]; N];
+    let (chunks, rest) = y.as_chunks::<WIDTH>();
+    let whole = y.len() - rest.len();
+    let of_columns = columns.map(|column| column[..whole].as_chunks::<WIDTH>().0);
+    for v in 0..T::parts::<S>(&sums[0]).len() {
+        let mut sum = sums.each_ref().map(|sum| T::parts::<S>(sum)[v]);
+        for (i, y) in chunks.iter().enumerate() {
+            let y = T::parts::<S>(y)[v];
+            for k in 0..N {
+                sum[k] = T::add_product(simd, T::parts::<S>(&of_columns[k][i])[v], y, sum[k]);
             }
         }
+        (0..N).for_each(|k| T::parts_mut::<S>(&mut sums[k])[v] = sum[k]);
     }
     std::array::from_fn(|k| {
-        let mut rest = T::default();
-        for (&l, &y) in columns[k][whole..].iter().zip(&y[whole..]) {
-            rest = l.fused(y, rest);
-        }
+        let rest = columns[k][whole..].iter().zip(rest).fold(T::default(), |sum, (&l, &y)| l.fused(y, sum));
         sums[k].iter().fold(rest, |sum, &part| sum + part)
     })
+}
+
+/// As [`forward`].
+#[inline(always)]
+fn forward_wide<T: Number, S: Simd>(simd: S, node: &Supernode<T>, x: &mut [Wide<T>], panel: &mut Vec<Wide<T>>) {
+    panel.clear();
+    panel.extend_from_slice(&x[node.begin..node.begin + node.width]);
+    panel.extend(node.below.iter().map(|&row| x[row as usize]));
+    let mut at = 0;
+    while at < node.width {
+        let count = COLUMNS.min(node.width - at);
+        for k in at..at + count {
+            let column = node.column(k, k);
+            panel[k] = panel[k].map(|x| x / column[0]);
+            let minus = panel[k].map(|v| -v);
+            for (y, &l) in panel[k + 1..at + count].iter_mut().zip(&column[1..]) {
+                add(simd, l, &minus, y);
+            }
+        }
+        let (solved, rest) = panel.split_at_mut(at + count);
+        let column = |k| node.column(at + k, at + count);
+        if count == COLUMNS {
+            let minus: [Wide<T>; COLUMNS] = std::array::from_fn(|k| solved[at + k].map(|v| -v));
+            let [p, q, r, s] = minus.each_ref().map(T::parts::<S>);
+            for ((((y, &a), &b), &c), &d) in rest.iter_mut().zip(column(0)).zip(column(1)).zip(column(2)).zip(column(3))
+            {
+                for (v, y) in T::parts_mut::<S>(y).iter_mut().enumerate() {
+                    let sum = T::add_product(simd, b.all(simd), q[v], T::add_product(simd, a.all(simd), p[v], *y));
+                    *y = T::add_product(simd, d.all(simd), s[v], T::add_product(simd, c.all(simd), r[v], sum));
+                }
+            }
+        } else {
+            for (k, value) in solved[at..].iter().enumerate() {
+                let minus = value.map(|v| -v);
+                rest.iter_mut().zip(column(k)).for_each(|(y, &l)| add(simd, l, &minus, y));
+            }
+        }
+        at += count;
+    }
+    x[node.begin..node.begin + node.width].copy_from_slice(&panel[..node.width]);
+    for (&row, value) in node.below.iter().zip(&panel[node.width..]) {
+        x[row as usize] = *value;
+    }
+}
+
+/// As [`backward`].
+#[inline(always)]
+fn backward_wide<T: Number, S: Simd>(simd: S, node: &Supernode<T>, x: &mut [Wide<T>], panel: &mut Vec<Wide<T>>) {
+    panel.clear();
+    panel.extend_from_slice(&x[node.begin..node.begin + node.width]);
+    panel.extend(node.below.iter().map(|&row| x[row as usize]));
+    let mut end = node.width;
+    while end > 0 {
+        let at = (end - 1) / COLUMNS * COLUMNS;
+        let count = end - at;
+        let (head, rest) = panel.split_at_mut(end);
+        let column = |k| node.column(at + k, end);
+        let mut sums = [[T::default(); WIDTH]; COLUMNS];
+        if count == COLUMNS {
+            let [p, q, r, s] = sums.each_mut().map(T::parts_mut::<S>);
+            for v in 0..p.len() {
+                let (mut e, mut f, mut g, mut h) = (p[v], q[v], r[v], s[v]);
+                for ((((y, &a), &b), &c), &d) in rest.iter().zip(column(0)).zip(column(1)).zip(column(2)).zip(column(3))
+                {
+                    let y = T::parts::<S>(y)[v];
+                    e = T::add_product(simd, a.all(simd), y, e);
+                    f = T::add_product(simd, b.all(simd), y, f);
+                    g = T::add_product(simd, c.all(simd), y, g);
+                    h = T::add_product(simd, d.all(simd), y, h);
+                }
+                (p[v], q[v], r[v], s[v]) = (e, f, g, h);
+            }
+        } else {
+            for (k, sum) in sums[..count].iter_mut().enumerate() {
+                rest.iter().zip(column(k)).for_each(|(y, &l)| add(simd, l, y, sum));
+            }
+        }
+        for (k, sum) in sums[..count].iter().enumerate() {
+            head[at + k] = std::array::from_fn(|l| head[at + k][l] - sum[l]);
+        }
+        for k in (at..end).rev() {
+            let column = node.column(k, k);
+            let (value, others) = head[k..end].split_first_mut().expect("it is before the end");
+            others.iter().zip(&column[1..]).for_each(|(y, &l)| add(simd, -l, y, value));
+            *value = value.map(|v| v / column[0]);
+        }
+        end = at;
+    }
+    x[node.begin..node.begin + node.width].copy_from_slice(&panel[..node.width]);
+}
+
+/// `y += factor x`.
+#[inline(always)]
+fn add<T: Number, S: Simd>(simd: S, factor: T, x: &Wide<T>, y: &mut Wide<T>) {
+    let factor = factor.all(simd);
+    for (y, &x) in T::parts_mut::<S>(y).iter_mut().zip(T::parts::<S>(x)) {
+        *y = T::add_product(simd, factor, x, *y);
+    }
 }

@@ -100,6 +100,12 @@ impl Brick {
         std::array::from_fn(|i| self.origin[i] + self.size[i] * at[i] as f64 / self.cells[i] as f64)
     }
 
+    /// The way between two nodes, from their lattice positions alone: the same bits wherever the two are.
+    pub fn way(&self, from: u64, to: u64) -> [f64; 3] {
+        let (from, to) = (self.node_position(from), self.node_position(to));
+        std::array::from_fn(|i| self.size[i] * (to[i] as f64 - from[i] as f64) / self.cells[i] as f64)
+    }
+
     /// Node numbers of the eight corners of a cell, by corner v = x + 2y + 4z.
     pub fn corners(&self, cell: [usize; 3]) -> [u64; 8] {
         let [i, j, k] = cell;

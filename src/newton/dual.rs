@@ -33,8 +33,6 @@ pub struct Dual<'s, 'a> {
     pub projector: &'s Projector<'a>,
     /// `M`.
     pub preconditioner: Option<&'s mut Preconditioner<'a>>,
-    /// Lower values of the own subdomains' tangents.
-    pub tangents: &'s [Vec<f64>],
     /// Where the time goes.
     pub timer: &'s Timer,
     /// Told the applications of F so far.
@@ -71,9 +69,7 @@ impl Projection for Dual<'_, '_> {
 impl Quadratic for Dual<'_, '_> {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         let Some(preconditioner) = &mut self.preconditioner else { return false };
-        let factors = &self.operator.factors;
-        let stiffness = |own: usize| (&factors.symbolic(own).pattern, &self.tangents[own][..]);
-        self.timer.time("preconditioner", || preconditioner.apply(stiffness, r, z));
+        self.timer.time("preconditioner", || preconditioner.apply(r, z));
         true
     }
 }

@@ -94,7 +94,7 @@ pub struct StepRecord {
     pub statistics: qp::Statistics,
     /// Applications of F, those around the quadratic program included.
     pub applications: usize,
-    /// Factorisations over all ranks.
+    /// Subdomains with a new factor, over all ranks.
     pub factorisations: usize,
     /// Wall time.
     pub seconds: f64,

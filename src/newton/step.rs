@@ -1,5 +1,7 @@
 //! One Newton step: tangents, factors, the dual quadratic program, and back to a displacement.
 
+use std::rc::Rc;
+
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
 use super::problem::{State, TornProblem};
@@ -30,7 +32,7 @@ pub struct Step {
     pub at_floor: bool,
     /// Applications of F, those around the quadratic program included.
     pub applications: usize,
-    /// Subdomains factorised, over all ranks.
+    /// Subdomains with a new factor, over all ranks; those that share one count, too.
     pub factorisations: usize,
 }
 
@@ -40,8 +42,10 @@ pub struct StepSolver<'a> {
     projector: Projector<'a>,
     preconditioner: Option<Preconditioner<'a>>,
     programs: Programs,
+    /// Congruent subdomains have the same number.
+    twins: Vec<Option<usize>>,
     /// Lower values of each own subdomain's tangent, as it was factorised.
-    tangents: Vec<Vec<f64>>,
+    tangents: Vec<Rc<Vec<f64>>>,
     /// How many of its elements yield; none if there is no factor to go on with.
     yielding: Vec<Option<usize>>,
     /// Scratch: a tangent that may be worth factorising.
@@ -49,17 +53,17 @@ pub struct StepSolver<'a> {
 }
 
 impl<'a> StepSolver<'a> {
-    /// On factors and a projector set up for the problem's subdomains.
+    /// On factors and a projector set up for the problem's subdomains; `twins` numbers those that have congruent ones.
     pub fn new(
         operator: DualOperator<'a>,
         projector: Projector<'a>,
         preconditioner: Option<Preconditioner<'a>>,
         settings: ProgramSettings,
-        own: usize,
+        twins: Vec<Option<usize>>,
     ) -> Self {
-        let (tangents, yielding) = (vec![Vec::new(); own], vec![None; own]);
+        let (tangents, yielding) = (vec![Rc::default(); twins.len()], vec![None; twins.len()]);
         let (programs, assembled) = (Programs::new(settings), Vec::new());
-        Self { operator, projector, preconditioner, programs, tangents, yielding, assembled }
+        Self { operator, projector, preconditioner, programs, twins, tangents, yielding, assembled }
     }
 
     /// Starts from the multipliers that a displacement and the rows that hold there suggest; returns them. `B B' = I`, so
@@ -127,7 +131,6 @@ impl<'a> StepSolver<'a> {
             operator: &mut self.operator,
             projector: &self.projector,
             preconditioner: self.preconditioner.as_mut(),
-            tangents: &self.tangents,
             timer,
             alive: &|applications| alive(applications - before),
         };
@@ -158,9 +161,24 @@ impl<'a> StepSolver<'a> {
         }
         let kept = |row: usize| held.kept()[row] || defect[row] < 0.0;
         timer.time("scaling", || preconditioner.scaling.restrict(problem.constraints, kept));
-        let factors = &self.operator.factors;
-        let stiffness = |own: usize| (&factors.symbolic(own).pattern, &self.tangents[own][..]);
-        timer.time("preconditioner", || preconditioner.mend(stiffness, &defect, du));
+        timer.time("preconditioner", || preconditioner.mend(&defect, du));
+    }
+
+    /// Gives an elastic subdomain what an elastic twin has already; `None` if there is none.
+    fn adopt(&mut self, own: usize, id: usize, timer: &Timer) -> Option<Result<(), NotDefinite>> {
+        let class = self.twins[own]?;
+        let elastic = |k: &usize| self.twins[*k] == Some(class) && self.yielding[*k] == Some(0);
+        let twins: Vec<usize> = (0..self.twins.len()).filter(elastic).collect();
+        let twin = *twins.first()?;
+        self.operator.factors.share(own, twin);
+        self.tangents[own] = Rc::clone(&self.tangents[twin]);
+        self.yielding[own] = Some(0);
+        let Some(Preconditioner { schur, .. }) = &mut self.preconditioner else { return Some(Ok(())) };
+        if let Some(twin) = twins.into_iter().find(|&k| schur.alike(own, k)) {
+            schur.share(own, twin);
+            return Some(Ok(()));
+        }
+        Some(timer.time("factorisation of the interior", || schur.update(own, id, &self.tangents[own], true)))
     }
 
     /// Assembles the tangents at `u` and factorises those that changed by more than `left`; returns how many, over all
@@ -182,25 +200,32 @@ impl<'a> StepSolver<'a> {
                 factorised.push(0.0);
                 continue;
             }
+            let elastic = state.yielding[own] == 0;
+            if elastic && let Some(outcome) = self.adopt(own, subdomain.id, timer) {
+                factorised.push(1.0);
+                failure = outcome.err();
+                continue;
+            }
             let pattern = &self.operator.factors.symbolic(own).pattern;
             let material = &problem.materials[own];
             self.assembled.resize(pattern.rows.len(), 0.0);
             let assembled = &mut self.assembled;
             timer.time("assembly", || stiffness::assemble(subdomain, material, &u[own], pattern, assembled));
-            let values = &mut self.tangents[own];
-            if self.yielding[own].is_some() && pattern.differ_at_most(left, values, assembled) {
+            if self.yielding[own].is_some() && pattern.differ_at_most(left, &self.tangents[own], assembled) {
                 factorised.push(0.0);
                 continue;
             }
             factorised.push(1.0);
             self.yielding[own] = Some(state.yielding[own]);
+            let values = Rc::make_mut(&mut self.tangents[own]);
             values.clone_from(assembled);
-            let outcome = timer.time("factorisation", || self.operator.factors.factorise(own, subdomain, values));
-            let interior = self.preconditioner.as_mut().and_then(|p| p.interior.as_mut());
-            let outcome = outcome.and_then(|()| match interior {
-                Some(factors) => {
-                    timer.time("factorisation of the interior", || factors.factorise(own, subdomain.id, values))
-                }
+            let common = elastic && self.twins[own].is_some();
+            let factors = &mut self.operator.factors;
+            let outcome = timer.time("factorisation", || factors.factorise(own, subdomain, values, common));
+            let outcome = outcome.and_then(|()| match &mut self.preconditioner {
+                Some(preconditioner) => timer.time("factorisation of the interior", || {
+                    preconditioner.schur.update(own, subdomain.id, values, common)
+                }),
                 None => Ok(()),
             });
             failure = outcome.err();

@@ -114,7 +114,7 @@ pub struct Counters {
     pub hessian_multiplications: Option<u64>,
     /// Applications of the preconditioner.
     pub preconditioner_applications: Option<u64>,
-    /// Factorisations of subdomain matrices.
+    /// Subdomains that got a new factor; congruent ones that share it count each.
     pub factorisations: Option<u64>,
 }
 
@@ -146,7 +146,7 @@ pub struct CascadeRow {
     pub newton_iterations: Option<u64>,
     /// Every application of F.
     pub hessian_multiplications: Option<u64>,
-    /// Factorisations of subdomain matrices.
+    /// Subdomains that got a new factor; congruent ones that share it count each.
     pub factorisations: Option<u64>,
     /// Wall time in seconds.
     pub seconds: f64,
@@ -173,7 +173,7 @@ pub struct NewtonRow {
     pub qp_iterations: u64,
     /// Applications of F.
     pub hessian_multiplications: u64,
-    /// Factorisations.
+    /// Subdomains that got a new factor.
     pub factorisations: u64,
     /// Wall time.
     pub seconds: f64,

@@ -7,7 +7,7 @@ use crate::assembly::stiffness;
 use crate::decomposition::Subdomain;
 use crate::feti::cholesky::Precision;
 use crate::feti::kernel::RigidModes;
-use crate::fixture::{built_in, dense, elastic, on_ranks, two_bricks, two_bricks_by_metis};
+use crate::fixture::{assert_close, built_in, column, dense, elastic, on_ranks, two_bricks, two_bricks_by_metis};
 use crate::material::samples::STEEL;
 use crate::random::Random;
 use crate::scene::Scene;
@@ -49,7 +49,7 @@ fn k_times_its_generalised_inverse_times_k_is_k() {
                 for u in [vec![0.0; subdomain.dofs()], stretched(subdomain)] {
                     let mut values = vec![0.0; factors.symbolic(own).pattern.rows.len()];
                     stiffness::assemble(subdomain, &STEEL, &u, &factors.symbolic(own).pattern, &mut values);
-                    factors.factorise(own, subdomain, &values).expect("stiff up to rigid motions");
+                    factors.factorise(own, subdomain, &values, false).expect("stiff up to rigid motions");
                     let times = |factors: &Factors, x: &[f64]| {
                         let mut y = vec![0.0; x.len()];
                         factors.symbolic(own).pattern.multiply_add(&values, x, &mut y);
@@ -59,9 +59,10 @@ fn k_times_its_generalised_inverse_times_k_is_k() {
                     for _ in 0..3 {
                         let x: Vec<f64> = (0..u.len()).map(|_| random.number()).collect();
                         let kx = times(&factors, &x);
-                        let mut back = kx.clone();
-                        factors.solve(own, &mut back);
-                        let kkkx = times(&factors, &back);
+                        let mut torn = setup.gather.zeros();
+                        torn[own].clone_from(&kx);
+                        factors.solve(&mut torn);
+                        let kkkx = times(&factors, &torn[own]);
                         let norm = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
                         let error: Vec<f64> = kkkx.iter().zip(&kx).map(|(a, b)| a - b).collect();
                         let relative = norm(&error) / norm(&kx);
@@ -105,7 +106,7 @@ fn a_stiffness_that_is_not_finite_or_not_definite_is_refused_by_name() {
             for at in [0, 1, stiffnesses[2].len() - 1, stiffnesses[2].len() - 2] {
                 let mut values = stiffnesses[2].clone();
                 values[at] = spoilt;
-                let error = factors.factorise(2, subdomain, &values).expect_err("it is spoilt");
+                let error = factors.factorise(2, subdomain, &values, false).expect_err("it is spoilt");
                 assert_eq!((error.subdomain, error.dofs), (2, subdomain.dofs()));
             }
         }
@@ -126,5 +127,38 @@ fn congruent_subdomains_share_their_analysis_and_others_do_not() {
             }
         }
         assert!(symbolic.iter().any(|s| !Rc::ptr_eq(s, &symbolic[0])));
+    });
+}
+
+/// With every number of twins, in both precisions.
+#[test]
+fn twins_get_what_they_would_get_alone_and_the_same_bits_beside_any_others() {
+    on_ranks(&built_in("patch", &[]), 1, |setup| {
+        let (subdomains, given) = (setup.subdomains(), setup.displacements(3));
+        let symbolic = analyse(subdomains);
+        let values = elastic(&subdomains[0], setup.material(0), &symbolic[0].pattern);
+        for (precision, tolerance) in [(Precision::Double, 1e-12), (Precision::Single, 1e-4)] {
+            let solved = |common: bool, twins: usize| {
+                let mut factors = Factors::new(symbolic.clone(), precision);
+                for (own, subdomain) in subdomains.iter().enumerate() {
+                    if common && (1..twins).contains(&own) {
+                        factors.share(own, 0);
+                    } else {
+                        factors.factorise(own, subdomain, &values, common).expect("definite");
+                    }
+                }
+                let mut x = given.clone();
+                factors.solve(&mut x);
+                x
+            };
+            let alone = solved(false, 0);
+            let together = solved(true, subdomains.len());
+            for (a, b) in alone.iter().zip(&together) {
+                assert_close(&column(b), &column(a), tolerance);
+            }
+            for twins in 1..subdomains.len() {
+                assert!(solved(true, twins) == together, "{twins} twins");
+            }
+        }
     });
 }

@@ -5,9 +5,9 @@ use super::{Preconditioner, boundaries};
 use crate::constraint::Kind;
 use crate::feti::cholesky::Precision;
 use crate::feti::factor::{Factors, analyse};
-use crate::feti::interior::{self, InteriorFactors};
 use crate::feti::operator::DualOperator;
 use crate::feti::scaling::Scaling;
+use crate::feti::schur::Schur;
 use crate::fixture::{
     Setup, assert_close, block_diagonal, built_in, column, dense, on_ranks, same_on_any_ranks, two_bricks,
     two_bricks_by_metis,
@@ -29,16 +29,12 @@ impl<'a> Case<'a> {
     fn new(setup: &'a Setup<'a>, dirichlet: bool, kept: impl Fn(usize) -> bool) -> Self {
         let (factors, stiffnesses) = setup.factors();
         let own = stiffnesses.len();
-        let interior = dirichlet.then(|| {
-            let whole = analyse(setup.subdomains());
-            let mut interior =
-                InteriorFactors::new(interior::analyse(&whole, boundaries(&setup.gather, own)), Precision::Double);
-            for (k, values) in stiffnesses.iter().enumerate() {
-                interior.factorise(k, k, values).expect("the interior is held by its boundary");
-            }
-            interior
-        });
-        let mut preconditioner = Preconditioner::new(&setup.gather, interior);
+        let whole = analyse(setup.subdomains());
+        let mut schur = Schur::new(&whole, boundaries(&setup.gather, own), dirichlet.then_some(Precision::Double));
+        for (k, values) in stiffnesses.iter().enumerate() {
+            schur.update(k, k, values, false).expect("the interior is held by its boundary");
+        }
+        let mut preconditioner = Preconditioner::new(&setup.gather, schur);
         let diagonals: Vec<Vec<f64>> =
             stiffnesses.iter().enumerate().map(|(k, values)| factors.symbolic(k).pattern.diagonal(values)).collect();
         preconditioner.scaling = Scaling::new(&setup.discrete.constraints, &setup.gather, &diagonals);
@@ -48,8 +44,7 @@ impl<'a> Case<'a> {
 
     fn apply(&mut self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];
-        let Self { preconditioner, factors, stiffnesses } = self;
-        preconditioner.apply(|own| (&factors.symbolic(own).pattern, &stiffnesses[own][..]), x, &mut y);
+        self.preconditioner.apply(x, &mut y);
         y
     }
 
@@ -167,8 +162,7 @@ fn mending_closes_the_defect_and_leaves_the_interior_without_force() {
                 let mut bu = vec![0.0; wanted.len()];
                 setup.gather.apply(&u, &mut bu);
                 let defect: Vec<f64> = wanted.iter().zip(&bu).map(|(c, b)| c - b).collect();
-                let stiffness = |own: usize| (&factors.symbolic(own).pattern, &stiffnesses[own][..]);
-                preconditioner.mend(stiffness, &defect, &mut u);
+                preconditioner.mend(&defect, &mut u);
                 setup.gather.apply(&u, &mut bu);
                 assert_close(&column(&bu), &column(&wanted), 1e-12);
 

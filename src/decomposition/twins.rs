@@ -1,0 +1,93 @@
+//! Which subdomains are congruent: equal shape and connectivity within one body, so that what depends on these alone (and
+//! on the body's material) is the same.
+
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use super::Subdomain;
+use crate::comm::{Comm, all_gather_u64};
+
+/// A number for each own subdomain that has congruent ones, here or on other ranks: equal for the congruent ones among
+/// the own. Whether a subdomain has one does not depend on the ranks. Collective.
+pub fn twins(comm: &dyn Comm, subdomains: &[Subdomain]) -> Vec<Option<usize>> {
+    let mine: Vec<u64> = subdomains.iter().map(hash).collect();
+    let mut count: HashMap<u64, usize> = HashMap::new();
+    all_gather_u64(comm, &mine).into_iter().for_each(|hash| *count.entry(hash).or_default() += 1);
+    let mut kinds: HashMap<u64, Vec<usize>> = HashMap::new();
+    mine.iter()
+        .enumerate()
+        .map(|(own, hash)| {
+            if count[hash] == 1 {
+                return None;
+            }
+            let firsts = kinds.entry(*hash).or_default();
+            let first = firsts.iter().copied().find(|&first| congruent(&subdomains[first], &subdomains[own]));
+            Some(first.unwrap_or_else(|| {
+                firsts.push(own);
+                own
+            }))
+        })
+        .collect()
+}
+
+fn congruent(a: &Subdomain, b: &Subdomain) -> bool {
+    a.body == b.body && a.shape == b.shape && a.elements == b.elements
+}
+
+fn hash(subdomain: &Subdomain) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    subdomain.body.hash(&mut hasher);
+    subdomain.elements.hash(&mut hasher);
+    subdomain.shape.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
+    hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{RANKS, on_ranks, two_bricks, two_bricks_by_metis};
+
+    #[test]
+    fn boxes_of_one_body_are_twins_wherever_they_are() {
+        // Coordinates in thirds are rounded differently in every box.
+        let thirds = two_bricks(&[
+            "body.lower.brick.size=[1.0, 1.0, 1.0]",
+            "body.lower.brick.origin=[0.1, 0.7, -123.4]",
+            "body.lower.brick.cells=[6, 6, 6]",
+            "body.upper.brick.origin=[0.1, 0.7, -122.4]",
+            "body.upper.brick.size=[2.0, 2.0, 2.0]",
+        ]);
+        for ranks in RANKS {
+            let found = on_ranks(&thirds, ranks, |setup| {
+                let twins = twins(setup.comm, setup.subdomains());
+                for (own, twin) in twins.iter().enumerate() {
+                    let first = twin.expect("it has twins");
+                    assert_eq!(setup.subdomains()[first].body, setup.subdomains()[own].body);
+                    assert!(twins[..own].iter().all(|other| other.is_some_and(|o| setup.subdomains()[o].body == 0)
+                        != (setup.subdomains()[own].body == 0)
+                        || *other == *twin));
+                }
+                twins.len()
+            });
+            assert_eq!(found.iter().sum::<usize>(), 27 + 2);
+        }
+    }
+
+    #[test]
+    fn a_part_of_its_own_shape_has_none() {
+        for ranks in RANKS {
+            let found = on_ranks(&two_bricks_by_metis(7), ranks, |setup| {
+                let alone = |own: usize| {
+                    let all: Vec<bool> = (0..setup.subdomains().len())
+                        .map(|k| congruent(&setup.subdomains()[k], &setup.subdomains()[own]))
+                        .collect();
+                    all.iter().filter(|same| **same).count() == 1
+                };
+                let twins = twins(setup.comm, setup.subdomains());
+                assert!(setup.comm.size() > 1 || (0..twins.len()).all(|own| twins[own].is_none() == alone(own)));
+                twins.iter().map(Option::is_some).collect::<Vec<_>>()
+            });
+            assert!(found.concat().contains(&false));
+        }
+    }
+}
