@@ -111,14 +111,20 @@ impl Analysis {
 /// Scratch memory for some analyses.
 pub struct Workspace {
     buffer: MemBuffer,
-    /// What is computed in single precision: the matrix, or the unknowns.
-    single: Vec<f32>,
-    /// The unknowns of a solve in double precision, in the order of elimination.
-    double: Vec<f64>,
+    single: Scratch<f32>,
+    double: Scratch<f64>,
+}
+
+/// Scratch in one precision.
+#[derive(Default)]
+struct Scratch<T> {
+    /// The matrix, or the unknowns in the order of elimination.
+    numbers: Vec<T>,
     /// The unknowns that one supernode touches.
-    panels: (Vec<f32>, Vec<f64>),
-    /// The same two for several right-hand sides, in single and in double precision.
-    wide: ([Vec<[f32; WIDTH]>; 2], [Vec<[f64; WIDTH]>; 2]),
+    panel: Vec<T>,
+    /// The unknowns of several right-hand sides, and those that one supernode touches.
+    wide: Vec<[T; WIDTH]>,
+    wide_panel: Vec<[T; WIDTH]>,
 }
 
 impl Workspace {
@@ -127,13 +133,7 @@ impl Workspace {
         let request =
             |Analysis(symbolic): &Analysis| symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
         let request = analyses.into_iter().map(request).fold(StackReq::EMPTY, StackReq::or);
-        Self {
-            buffer: MemBuffer::new(request),
-            single: Vec::new(),
-            double: Vec::new(),
-            panels: Default::default(),
-            wide: Default::default(),
-        }
+        Self { buffer: MemBuffer::new(request), single: Scratch::default(), double: Scratch::default() }
     }
 
     /// Overwrites `factor` by the factor of the matrix with these lower values.
@@ -151,9 +151,10 @@ impl Workspace {
         match factor {
             Factor::Double(factor) => factorise(analysis, lower, values, factor, stack),
             Factor::Single(factor) => {
-                self.single.clear();
-                self.single.extend(values.iter().map(|&v| v as f32));
-                factorise(analysis, lower, &self.single, factor, stack)
+                let Scratch { numbers, .. } = &mut self.single;
+                numbers.clear();
+                numbers.extend(values.iter().map(|&v| v as f32));
+                factorise(analysis, lower, numbers, factor, stack)
             }
         }
     }
@@ -165,19 +166,21 @@ impl Workspace {
         let order = order.arrays().0;
         match factor {
             Factor::Double(factor) => {
-                self.double.clear();
-                self.double.extend(order.iter().map(|&k| x[k as usize]));
-                supernodes::solve(panels, factor, &mut self.double, &mut self.panels.1);
-                order.iter().zip(&self.double).for_each(|(&k, &y)| x[k as usize] = y);
+                let Scratch { numbers, panel, .. } = &mut self.double;
+                numbers.clear();
+                numbers.extend(order.iter().map(|&k| x[k as usize]));
+                supernodes::solve(panels, factor, numbers, panel);
+                order.iter().zip(&*numbers).for_each(|(&k, &y)| x[k as usize] = y);
             }
             Factor::Single(factor) => {
                 // Scaled, for the range of single precision is small.
                 let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
                 let scale = if largest > 0.0 { largest } else { 1.0 };
-                self.single.clear();
-                self.single.extend(order.iter().map(|&k| (x[k as usize] / scale) as f32));
-                supernodes::solve(panels, factor, &mut self.single, &mut self.panels.0);
-                order.iter().zip(&self.single).for_each(|(&k, &y)| x[k as usize] = scale * f64::from(y));
+                let Scratch { numbers, panel, .. } = &mut self.single;
+                numbers.clear();
+                numbers.extend(order.iter().map(|&k| (x[k as usize] / scale) as f32));
+                supernodes::solve(panels, factor, numbers, panel);
+                order.iter().zip(&*numbers).for_each(|(&k, &y)| x[k as usize] = scale * f64::from(y));
             }
         }
     }
@@ -188,14 +191,14 @@ impl Workspace {
         let (order, (x, _)) = (order.arrays().0, x.as_chunks_mut::<WIDTH>());
         match factor {
             Factor::Double(factor) => {
-                let [unknowns, panel] = &mut self.wide.1;
+                let Scratch { wide: unknowns, wide_panel: panel, .. } = &mut self.double;
                 unknowns.clear();
                 unknowns.extend(order.iter().map(|&k| x[k as usize]));
                 supernodes::solve_wide(panels, factor, unknowns, panel);
                 order.iter().zip(&*unknowns).for_each(|(&k, y)| x[k as usize] = *y);
             }
             Factor::Single(factor) => {
-                let [unknowns, panel] = &mut self.wide.0;
+                let Scratch { wide: unknowns, wide_panel: panel, .. } = &mut self.single;
                 let mut largest = [0.0_f64; WIDTH];
                 x.iter().for_each(|x| (0..WIDTH).for_each(|l| largest[l] = largest[l].max(x[l].abs())));
                 let scale = largest.map(|m| if m > 0.0 { m } else { 1.0 });

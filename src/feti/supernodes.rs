@@ -62,7 +62,7 @@ impl Number for f32 {
 
     #[inline(always)]
     fn parts<S: Simd>(x: &Wide<Self>) -> &[S::f32s] {
-        const { assert!(WIDTH % S::F32_LANES == 0) };
+        const { assert!(WIDTH.is_multiple_of(S::F32_LANES)) };
         S::as_simd_f32s(x).0
     }
 
@@ -92,7 +92,7 @@ impl Number for f64 {
 
     #[inline(always)]
     fn parts<S: Simd>(x: &Wide<Self>) -> &[S::f64s] {
-        const { assert!(WIDTH % S::F64_LANES == 0) };
+        const { assert!(WIDTH.is_multiple_of(S::F64_LANES)) };
         S::as_simd_f64s(x).0
     }
 
