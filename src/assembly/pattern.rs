@@ -90,18 +90,22 @@ impl Pattern {
         }
     }
 
-    /// Whether no entries of two matrices differ by more than `share` times the geometric mean of their diagonals.
-    pub fn differ_at_most(&self, share: f64, values: &[f64], others: &[f64]) -> bool {
+    /// The largest difference of two matrices' entries, relative to the geometric mean of the first one's diagonals; NaN if
+    /// one is not finite.
+    pub fn difference(&self, values: &[f64], others: &[f64]) -> f64 {
         let diagonal = self.diagonal(values);
-        (0..self.dofs()).all(|column| {
+        let mut largest = 0.0;
+        for column in 0..self.dofs() {
             let range = self.column_begin[column] as usize..self.column_begin[column + 1] as usize;
-            let limit = share * share * diagonal[column];
             let entries = values[range.clone()].iter().zip(&others[range.clone()]);
-            self.rows[range]
-                .iter()
-                .zip(entries)
-                .all(|(&row, (a, b))| (a - b) * (a - b) <= limit * diagonal[row as usize])
-        })
+            for (&row, (a, b)) in self.rows[range].iter().zip(entries) {
+                let square = (a - b) * (a - b) / (diagonal[column] * diagonal[row as usize]);
+                if square > largest || square.is_nan() {
+                    largest = square;
+                }
+            }
+        }
+        largest.sqrt()
     }
 
     /// The diagonal of the matrix with these values.
@@ -123,9 +127,9 @@ mod tests {
         let mut others = values.clone();
         // The diagonals are 1 and 100: 0.5 is a share of 0.05.
         pattern.add_block(&mut others, 3, 1, &block(0.5));
-        assert!(pattern.differ_at_most(0.051, &values, &others) && !pattern.differ_at_most(0.049, &values, &others));
+        assert!((pattern.difference(&values, &others) - 0.05).abs() < 1e-15);
         others[0] = f64::NAN;
-        assert!(!pattern.differ_at_most(1.0, &values, &others));
+        assert!(pattern.difference(&values, &others).is_nan());
     }
 
     #[test]
