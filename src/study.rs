@@ -182,7 +182,9 @@ pub fn memory_estimate_mb(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -
     let doubles: f64 = analysed
         .iter()
         .map(|s| {
-            factors * s.factor_length() as f64 + 1.5 * s.pattern.rows.len() as f64 + 12.0 * s.pattern.dofs() as f64
+            factors * s.analysis().factor_length() as f64
+                + 1.5 * s.pattern.rows.len() as f64
+                + 12.0 * s.pattern.dofs() as f64
         })
         .sum();
     // A row of G' and a row's terms; the coarse factor is small beside them.

@@ -16,6 +16,7 @@ use faer::{Par, Side, Spec};
 
 use super::supernodes;
 pub use super::supernodes::WIDTH;
+use crate::assembly::pattern::Pattern;
 
 /// Sparsity of a symmetric matrix: its lower triangle by columns, rows ascending.
 #[derive(Clone, Copy)]
@@ -24,6 +25,12 @@ pub struct Lower<'a> {
     pub column_begin: &'a [u32],
     /// Row of each entry.
     pub rows: &'a [u32],
+}
+
+impl<'a> From<&'a Pattern> for Lower<'a> {
+    fn from(pattern: &'a Pattern) -> Self {
+        Self { column_begin: &pattern.column_begin, rows: &pattern.rows }
+    }
 }
 
 impl<'a> Lower<'a> {
@@ -85,19 +92,11 @@ impl Analysis {
     pub fn ordered(lower: Lower, order: &[u32]) -> Self {
         let mut inverse = vec![0; order.len()];
         order.iter().enumerate().for_each(|(place, &unknown)| inverse[unknown as usize] = place as u32);
-        Self::new(lower, SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len())))
-    }
-
-    /// In an approximate minimum degree order.
-    pub fn minimum_degree(lower: Lower) -> Self {
-        Self::new(lower, SymmetricOrdering::Amd)
-    }
-
-    fn new(lower: Lower, ordering: SymmetricOrdering<u32>) -> Self {
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
+        let ordering = SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len()));
         let symbolic = factorize_symbolic_cholesky(lower.pattern(), Side::Lower, ordering, params);
         Self(symbolic.expect("a factor fits in memory and its index type"))
     }
@@ -105,6 +104,16 @@ impl Analysis {
     /// Numbers in the factor.
     pub fn factor_length(&self) -> usize {
         self.0.len_val()
+    }
+
+    /// Additions and multiplications of a factorisation.
+    pub fn flops(&self) -> f64 {
+        let SymbolicCholeskyRaw::Supernodal(panels) = self.0.raw() else { return 0.0 };
+        let rows = |s: usize, column: usize| {
+            let width = (panels.supernode_end()[s] - panels.supernode_begin()[s]) as usize;
+            (column < width).then(|| (width - column + panels.supernode(s).pattern().len()) as f64)
+        };
+        (0..panels.n_supernodes()).flat_map(|s| (0..).map_while(move |column| rows(s, column))).map(|n| n * n).sum()
     }
 }
 
@@ -249,8 +258,9 @@ mod tests {
         let [small, large] = [5_u32, 40].map(|n| (n, chain(n, 0.5)));
         let analyses = [&small, &large].map(|(n, (column_begin, rows, _))| {
             let lower = Lower { column_begin, rows };
+            let order: Vec<u32> = (0..*n).collect();
             let backwards: Vec<u32> = (0..*n).rev().collect();
-            [Analysis::ordered(lower, &backwards), Analysis::minimum_degree(lower)]
+            [Analysis::ordered(lower, &backwards), Analysis::ordered(lower, &order)]
         });
         let mut workspace = Workspace::new(analyses.iter().flatten());
         for ((n, (column_begin, rows, values)), pair) in [&small, &large].into_iter().zip(&analyses) {

@@ -11,6 +11,7 @@ use thiserror::Error;
 use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use super::gather::Gather;
 use super::kernel::RigidModes;
+use super::ordering::nested_dissection;
 use crate::comm::{Comm, Shares, all_gather_u64};
 use crate::constraint::Constraints;
 use crate::decomposition::Subdomain;
@@ -187,6 +188,15 @@ fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
         .collect()
 }
 
+/// The subdomains that each one has a block with, as METIS wants it: begins and neighbours.
+fn adjacency(blocks: &Blocks, subdomains: usize) -> (Vec<i32>, Vec<i32>) {
+    let mut pairs: Vec<(usize, usize)> =
+        blocks.keys().filter(|(a, b)| a != b).flat_map(|&(a, b)| [(a, b), (b, a)]).collect();
+    pairs.sort_unstable();
+    let begins = (0..=subdomains).map(|s| pairs.partition_point(|pair| pair.0 < s) as i32).collect();
+    (begins, pairs.into_iter().map(|pair| pair.1 as i32).collect())
+}
+
 /// Sparse Cholesky factor of `G G'`, whole on every rank.
 pub struct CoarseFactor {
     cholesky: Analysis,
@@ -214,7 +224,8 @@ impl CoarseFactor {
             begins.push(rows.len() as u32);
         }
         let lower = Lower { column_begin: &begins, rows: &rows };
-        let cholesky = Analysis::minimum_degree(lower);
+        let order = nested_dissection(&adjacency(blocks, subdomains), MODES as u32);
+        let cholesky = Analysis::ordered(lower, &order);
         let mut workspace = Workspace::new([&cholesky]);
         let mut factor = Factor::new(&cholesky, Precision::Double);
         workspace
@@ -229,13 +240,19 @@ impl CoarseFactor {
     /// Inverse iteration from a fixed vector without a pattern: a free motion shows as a huge response.
     fn check_rank(&self, n: usize, largest: f64) -> Result<(), Floating> {
         let sound = |response: f64| response.abs() * largest < (n as f64).sqrt() / SINGULAR;
-        let mut x: Vec<f64> = (0..n).map(|k| if (k * k + k / 3) % 7 < 3 { 1.0 } else { -1.0 }).collect();
+        // Multiples of an irrational number: no motion of a few subdomains is orthogonal to them.
+        let mut x: Vec<f64> = (1..=n).map(|k| (k as f64 * std::f64::consts::SQRT_2).fract() - 0.5).collect();
         self.solve(&mut x);
         let worst = x.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         match worst {
             Some((at, response)) if !sound(*response) => Err(Floating { subdomain: at / MODES }),
             _ => Ok(()),
         }
+    }
+
+    /// Numbers in the factor.
+    pub fn length(&self) -> usize {
+        self.cholesky.factor_length()
     }
 
     /// `a = (G G')^-1 a`, six numbers a subdomain. Local.

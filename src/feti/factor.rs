@@ -52,8 +52,8 @@ impl Symbolic {
     pub fn new(subdomain: &Subdomain) -> Self {
         let fixing = fixing_nodes(&subdomain.shape);
         let pattern = Pattern::new(subdomain.nodes.len(), &subdomain.elements, &fixing);
-        let order = nested_dissection(&pattern.adjacency);
-        let cholesky = Analysis::ordered(lower(&pattern), &order);
+        let order = nested_dissection(&pattern.adjacency, 3);
+        let cholesky = Analysis::ordered(Lower::from(&pattern), &order);
         Self { pattern, order, fixing, cholesky }
     }
 
@@ -62,14 +62,10 @@ impl Symbolic {
         subdomain.elements == of.elements && fixing_nodes(&subdomain.shape) == self.fixing
     }
 
-    /// Numbers in the factor.
-    pub fn factor_length(&self) -> usize {
-        self.cholesky.factor_length()
+    /// Order and sparsity of the factor.
+    pub fn analysis(&self) -> &Analysis {
+        &self.cholesky
     }
-}
-
-fn lower(pattern: &Pattern) -> Lower<'_> {
-    Lower { column_begin: &pattern.column_begin, rows: &pattern.rows }
 }
 
 /// Analyses all subdomains, sharing among those of equal connectivity.
@@ -148,13 +144,13 @@ impl Factors {
         if factor.precision() != self.precision {
             *factor = Factor::new(cholesky, self.precision);
         }
-        let outcome = self.workspace.factorise(cholesky, lower(pattern), &self.shifted, factor);
+        let outcome = self.workspace.factorise(cholesky, Lower::from(pattern), &self.shifted, factor);
         if factor.precision() == Precision::Double {
             return outcome.map_err(|breakdown| refuse(breakdown.place));
         }
         if outcome.is_err() || !passes_probe(pattern, &self.shifted, |x| self.workspace.solve(cholesky, factor, x)) {
             *factor = Factor::new(cholesky, Precision::Double);
-            let outcome = self.workspace.factorise(cholesky, lower(pattern), &self.shifted, factor);
+            let outcome = self.workspace.factorise(cholesky, Lower::from(pattern), &self.shifted, factor);
             return outcome.map_err(|breakdown| refuse(breakdown.place));
         }
         Ok(())

@@ -1,12 +1,12 @@
-//! Fill-reducing ordering by METIS nested dissection of the node graph, three unknowns a node.
+//! Fill-reducing ordering by METIS nested dissection of a graph whose nodes have some unknowns each.
 
 use crate::decomposition::metis::alone;
 
-/// The unknown at each place of the elimination, from the adjacency of the nodes.
+/// The unknown at each place of the elimination, from the adjacency of the nodes with `width` unknowns each.
 ///
 /// # Panics
 /// If METIS refuses the graph: a bug, since the adjacency is symmetric and free of loops.
-pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>)) -> Vec<u32> {
+pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>), width: u32) -> Vec<u32> {
     let (begins, neighbours) = adjacency;
     let nodes = begins.len() - 1;
     let mut count = nodes as metis_sys::idx_t;
@@ -25,5 +25,5 @@ pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>)) -> Vec<u32> {
         )
     };
     assert_eq!(status, metis_sys::rstatus_et_METIS_OK, "METIS orders a valid graph");
-    forward.iter().flat_map(|&n| (0..3).map(move |a| 3 * n as u32 + a)).collect()
+    forward.iter().flat_map(|&n| (0..width).map(move |a| width * n as u32 + a)).collect()
 }
