@@ -123,6 +123,11 @@ impl Brick {
         6 * self.cell(cell) + tet as u64
     }
 
+    /// Node numbers of an element of the body.
+    pub fn tet(&self, element: u64) -> [u64; 4] {
+        self.tets(self.cell_position(element / 6))[(element % 6) as usize]
+    }
+
     /// The element around a point inside the brick, given in cells from its origin: its nodes and the values there of
     /// their linear functions.
     pub fn around(&self, at: [f64; 3]) -> ([u64; 4], [f64; 4]) {

@@ -1,0 +1,113 @@
+//! Physical surfaces as triangles on the boundary of a volume.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use super::Msh;
+use super::error::Problem;
+use super::volume::{higher_order, listed};
+use crate::mesh::faces::{Neighbours, key};
+use crate::mesh::split;
+use crate::mesh::tets::TetMesh;
+
+/// The boundary of a volume, and the file that names parts of it.
+pub(super) struct Boundary<'a> {
+    pub msh: &'a Msh,
+    /// Name of the volume.
+    pub volume: &'a str,
+    /// Its elements.
+    pub mesh: &'a TetMesh,
+    pub neighbours: &'a Neighbours,
+    /// From the file's nodes to the mesh's; `u32::MAX` for nodes of other volumes.
+    pub index: &'a [u32],
+}
+
+/// What a physical surface has.
+struct Surface {
+    /// Triangles whose nodes are all in the volume, with ascending nodes.
+    triangles: Vec<[u32; 3]>,
+    /// All triangles.
+    all: u64,
+}
+
+impl Boundary<'_> {
+    /// The part of each physical surface that is on the boundary, with the sense of the elements: Gmsh's surfaces have
+    /// either.
+    ///
+    /// # Errors
+    /// If a surface is missing, lies elsewhere, or inside the volume.
+    pub fn surfaces(&self, names: &[&str]) -> Result<Vec<(String, Vec<[u32; 3]>)>, Problem> {
+        let wanted = names.iter().map(|name| self.wanted(name)).collect::<Result<Vec<_>, _>>()?;
+        let mut of_triangle: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
+        for (surface, Surface { triangles, .. }) in wanted.iter().enumerate() {
+            for &triangle in triangles {
+                let surfaces = of_triangle.entry(triangle).or_default();
+                // A file may have the same triangle several times.
+                if surfaces.last() != Some(&surface) {
+                    surfaces.push(surface);
+                }
+            }
+        }
+        let surfaces_of = |face: &[u32; 3]| of_triangle.get(&key(*face)).into_iter().flatten().copied();
+        let mut result: Vec<_> = names.iter().map(|name| (name.to_string(), Vec::new())).collect();
+        for face in self.neighbours.outer(&self.mesh.tets) {
+            surfaces_of(&face).for_each(|surface| result[surface].1.push(face));
+        }
+        let mut inner = vec![0; names.len()];
+        let inner_faces = self.neighbours.inner(&self.mesh.tets);
+        inner_faces.flat_map(|face| surfaces_of(&face)).for_each(|surface| inner[surface] += 1);
+
+        let volume = || self.volume.to_owned();
+        for (((name, found), inner), Surface { all, .. }) in result.iter().zip(inner).zip(&wanted) {
+            let (name, triangles) = (name.clone(), *all);
+            if inner > 0 {
+                return Err(Problem::InnerSurface { name, volume: volume(), inner, triangles });
+            }
+            if found.is_empty() {
+                return Err(Problem::ElsewhereSurface { name, triangles, volume: volume(), known: self.known() });
+            }
+        }
+        Ok(result)
+    }
+
+    fn wanted(&self, name: &str) -> Result<Surface, Problem> {
+        let surface = self.surface(name)?;
+        if surface.all == 0 {
+            let known = listed(&self.msh.group_names(2), "triangles or quadrangles");
+            return Err(Problem::NoSurface { name: name.to_owned(), known });
+        }
+        Ok(surface)
+    }
+
+    fn surface(&self, name: &str) -> Result<Surface, Problem> {
+        let mut surface = Surface { triangles: Vec::new(), all: 0 };
+        for block in self.msh.group(2, name) {
+            if !block.kind.linear {
+                return Err(higher_order(format!("surface `{name}`"), self.msh.group(2, name)));
+            }
+            for cell in block.nodes.chunks_exact(block.kind.nodes) {
+                split::triangles(cell, |triangle| {
+                    surface.all += 1;
+                    let local = triangle.map(|n| self.index[n as usize]);
+                    if !local.contains(&u32::MAX) {
+                        surface.triangles.push(key(local));
+                    }
+                });
+            }
+        }
+        Ok(surface)
+    }
+
+    /// Physical surfaces with triangles on the boundary.
+    fn known(&self) -> String {
+        let outer: HashSet<_> = self.neighbours.outer(&self.mesh.tets).map(key).collect();
+        let mut known = BTreeMap::new();
+        for name in self.msh.group_names(2).into_keys() {
+            let triangles = self.surface(&name).map_or(Vec::new(), |surface| surface.triangles);
+            let count = triangles.iter().filter(|t| outer.contains(*t)).count() as u64;
+            if count > 0 {
+                known.insert(name, count);
+            }
+        }
+        listed(&known, "triangles")
+    }
+}

@@ -1,0 +1,145 @@
+//! One body out of a mesh file: the elements of a physical volume, and physical surfaces on its boundary.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::error::Problem;
+use super::surface::Boundary;
+use super::{Block, Msh};
+use crate::mesh::faces::Neighbours;
+use crate::mesh::quality::Quality;
+use crate::mesh::split;
+use crate::mesh::tets::TetMesh;
+
+impl Msh {
+    /// The physical volume of this name (or number, if it has no name), or the only one there is, with these surfaces.
+    ///
+    /// # Errors
+    /// If the volume or one of the surfaces is missing, or elements cannot be computed with.
+    pub fn volume(&self, volume: Option<&str>, surfaces: &[&str]) -> Result<TetMesh, Problem> {
+        self.refuse_untagged()?;
+        let volume = &self.choose(volume)?;
+        let mut blocks = Vec::new();
+        for block in self.group(3, volume) {
+            if !block.kind.linear {
+                return Err(higher_order(format!("volume `{volume}`"), self.group(3, volume)));
+            }
+            blocks.push(block);
+        }
+
+        let mut index = vec![u32::MAX; self.points.len()];
+        blocks.iter().flat_map(|b| &b.nodes).for_each(|&n| index[n as usize] = 0);
+        let mut mesh = TetMesh { cells: blocks.iter().map(|b| b.cells).sum(), ..TetMesh::default() };
+        for (index, point) in index.iter_mut().zip(&self.points).filter(|(index, _)| **index == 0) {
+            *index = mesh.points.len() as u32;
+            mesh.points.push(*point);
+        }
+        // Both sides of a face are cut alike because nodes keep their order.
+        for block in &blocks {
+            for cell in block.nodes.chunks_exact(block.kind.nodes) {
+                split::tetrahedra(cell, |tet| mesh.tets.push(tet.map(|n| index[n as usize])));
+            }
+        }
+        if mesh.tets.len() >= MOST_ELEMENTS {
+            let limit = format!("the {MOST_ELEMENTS} that a graph of METIS can have");
+            let announced = mesh.tets.len() as u64;
+            return Err(Problem::TooMany { section: "Elements", items: "tetrahedra", announced, limit });
+        }
+        check_elements(volume, &mesh)?;
+        let neighbours = Neighbours::new(mesh.points.len(), &mesh.tets);
+        if neighbours.overlapping > 0 {
+            return Err(Problem::Overlapping { volume: volume.clone(), faces: neighbours.overlapping });
+        }
+        mesh.surfaces =
+            Boundary { msh: self, volume, mesh: &mesh, neighbours: &neighbours, index: &index }.surfaces(surfaces)?;
+        Ok(mesh)
+    }
+
+    /// Volumes that some physical group names, by name.
+    pub fn volume_names(&self) -> BTreeSet<String> {
+        self.group_names(3).into_keys().collect()
+    }
+
+    /// Cells of each physical group of a dimension, by its name, or its number if it has none.
+    pub(super) fn group_names(&self, dimension: i32) -> BTreeMap<String, u64> {
+        let mut names = BTreeMap::new();
+        for block in self.blocks.iter().filter(|b| b.kind.dimension == dimension) {
+            for name in block.groups.iter().map(|&tag| self.name(dimension, tag)) {
+                *names.entry(name).or_default() += block.cells;
+            }
+        }
+        names
+    }
+
+    fn name(&self, dimension: i32, tag: i32) -> String {
+        let known = self.names.iter().find(|n| n.dimension == dimension && n.tag == tag);
+        known.map_or_else(|| tag.to_string(), |n| n.name.clone())
+    }
+
+    /// Blocks of a physical group.
+    pub(super) fn group(&self, dimension: i32, name: &str) -> impl Iterator<Item = &Block> {
+        let of = move |b: &&Block| {
+            b.kind.dimension == dimension && b.groups.iter().any(|&tag| self.name(dimension, tag) == name)
+        };
+        self.blocks.iter().filter(of)
+    }
+
+    fn refuse_untagged(&self) -> Result<(), Problem> {
+        let volumes = || self.blocks.iter().filter(|b| b.kind.dimension == 3 && b.cells > 0);
+        let all: u64 = volumes().map(|b| b.cells).sum();
+        if all == 0 {
+            return Err(Problem::NoVolumeCells);
+        }
+        let untagged = || volumes().filter(|b| b.groups.is_empty());
+        let cells: u64 = untagged().map(|b| b.cells).sum();
+        if cells == 0 {
+            return Ok(());
+        }
+        let entities: BTreeSet<i32> = untagged().map(|b| b.entity).collect();
+        let shown: Vec<String> = entities.iter().take(10).map(i32::to_string).collect();
+        let entities = if entities.len() > 10 { format!("{}, ...", shown.join(", ")) } else { shown.join(", ") };
+        let hint = if cells < all { ", or save named ones only with `Mesh.SaveAll = 0;`" } else { "" };
+        Err(Problem::Untagged { cells, all, entities, hint })
+    }
+
+    fn choose(&self, volume: Option<&str>) -> Result<String, Problem> {
+        let known = self.group_names(3);
+        match volume {
+            Some(name) if known.contains_key(name) => Ok(name.to_owned()),
+            Some(name) => Err(Problem::NoVolume { name: name.to_owned(), known: listed(&known, "cells") }),
+            None if known.len() == 1 => Ok(known.into_keys().next().expect("there is one")),
+            None => Err(Problem::WhichVolume { count: known.len(), known: listed(&known, "cells") }),
+        }
+    }
+}
+
+/// Refuses elements without a positive volume.
+fn check_elements(volume: &str, mesh: &TetMesh) -> Result<(), Problem> {
+    let Quality { elements, inverted, degenerate, .. } = Quality::of(mesh.tets.iter().map(|&tet| mesh.corners(tet)));
+    if inverted + degenerate == 0 {
+        return Ok(());
+    }
+    let bad = |tet: &&[u32; 4]| !Quality::of([mesh.corners(**tet)]).is_sound();
+    let first = mesh.corners(*mesh.tets.iter().find(bad).expect("some are counted"));
+    let near = std::array::from_fn(|a| first.iter().map(|corner| corner[a] / 4.0).sum());
+    let hint = if inverted == elements { ", or turn all cells inside out" } else { "" };
+    Err(Problem::BadElements { volume: volume.to_owned(), elements, inverted, degenerate, near, hint })
+}
+
+/// Cells of higher order, counted.
+pub(super) fn higher_order<'a>(what: String, blocks: impl Iterator<Item = &'a Block>) -> Problem {
+    let curved: Vec<&Block> = blocks.filter(|b| !b.kind.linear).collect();
+    let cells = curved.iter().map(|b| b.cells).sum();
+    Problem::HigherOrder { what, cells, kind: curved.first().map_or("curved", |b| b.kind.name) }
+}
+
+/// Names and counts in words.
+pub(super) fn listed(known: &BTreeMap<String, u64>, items: &str) -> String {
+    if known.is_empty() {
+        return "there are none".to_owned();
+    }
+    let each: Vec<String> = known.iter().map(|(name, count)| format!("`{name}` ({count} {items})")).collect();
+    format!("there are {}", each.join(", "))
+}
+
+/// Elements that the graph of METIS can number: four faces each, in 31 bits.
+const MOST_ELEMENTS: usize = 1 << 29;
