@@ -1,4 +1,4 @@
-//! From the solution on a coarse mesh to a start on a finer one of the same bodies.
+//! From the solution on a coarse mesh to a start on a finer one of the same bodies, which are bricks.
 //!
 //! The displacement is interpolated: the coarse elements' linear functions at the fine nodes. A contact is closed where
 //! the nearest coarse one is. Plastic state and multipliers follow from these two by the equations themselves.
@@ -13,6 +13,7 @@ use crate::decomposition::bricks::Boxes;
 use crate::decomposition::{BodyMesh, Subdomain};
 use crate::feti::Torn;
 use crate::material::Material;
+use crate::mesh::Brick;
 
 /// Displacement of the coarse mesh at the nodes of own fine subdomains. Copies of a node get the same bits, on any
 /// number of ranks. Collective.
@@ -37,10 +38,15 @@ pub fn interpolate(
 
 /// The coarse element around a fine node: its nodes, numbered over all bodies, and the values of their linear functions.
 fn locate(coarse: &BodyMesh, fine: &BodyMesh, node: u64) -> ([u64; 4], [f64; 4]) {
-    let at = fine.brick.node_position(node - fine.first_node);
-    let in_cells = std::array::from_fn(|a| (at[a] * coarse.brick.cells[a]) as f64 / fine.brick.cells[a] as f64);
-    let (nodes, weights) = coarse.brick.around(in_cells);
+    let bricks = [coarse, fine].map(brick);
+    let at = bricks[1].node_position(node - fine.first_node);
+    let in_cells = std::array::from_fn(|a| (at[a] * bricks[0].cells[a]) as f64 / bricks[1].cells[a] as f64);
+    let (nodes, weights) = bricks[0].around(in_cells);
     (nodes.map(|n| coarse.first_node + n), weights)
+}
+
+fn brick(body: &BodyMesh) -> &Brick {
+    body.brick().expect("only bricks have levels")
 }
 
 fn mean(values: &HashMap<u64, [f64; 3]>, corners: &[u64; 4], weights: &[f64; 4]) -> [f64; 3] {
@@ -89,10 +95,10 @@ pub fn closed_contacts(
     let nearest = |node: u64| {
         let body = fine_bodies.iter().rposition(|body| body.first_node <= node).expect("a node is in a body");
         let (fine, coarse) = (&fine_bodies[body], &coarse_bodies[body]);
-        let at = fine.brick.node_position(node - fine.first_node);
-        let cells = (fine.brick.cells, coarse.brick.cells);
-        coarse.first_node
-            + coarse.brick.node(std::array::from_fn(|a| (2 * at[a] * cells.1[a] + cells.0[a]) / (2 * cells.0[a])))
+        let at = brick(fine).node_position(node - fine.first_node);
+        let cells = (brick(fine).cells, brick(coarse).cells);
+        let place = std::array::from_fn(|a| (2 * at[a] * cells.1[a] + cells.0[a]) / (2 * cells.0[a]));
+        coarse.first_node + brick(coarse).node(place)
     };
     fine_pairs.iter().map(|pair| closed.contains(&(pair.contact, nearest(pair.slave)))).collect()
 }
@@ -112,7 +118,7 @@ pub fn costs<'a>(
     let numbers = boxes.numbers();
     let mut yielding = HashSet::new();
     for (subdomain, u) in subdomains.iter().zip(u) {
-        let (body, brick) = (subdomain.body, &bodies[subdomain.body].brick);
+        let (body, brick) = (subdomain.body, brick(&bodies[subdomain.body]));
         for nodes in internal::yielding(subdomain, material(body), u) {
             let centre = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>() / 4.0;
             let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);
@@ -191,7 +197,7 @@ mod tests {
         let (coarse, fine) = (discrete(&two_bricks(&[]), &Solo), discrete(&two_bricks(&FINER), &Solo));
         let place = |d: &Discrete, pair: &ContactPair| {
             let body = &d.bodies[1];
-            body.brick.coordinates(body.brick.node_position(pair.slave - body.first_node))
+            brick(body).coordinates(brick(body).node_position(pair.slave - body.first_node))
         };
         let closed: Vec<u64> =
             (0..coarse.pairs.len() as u64).filter(|&k| place(&coarse, &coarse.pairs[k as usize])[0] < 2.5).collect();

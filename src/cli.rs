@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use thiserror::Error;
 
+use crate::bodies::MeshError;
 use crate::comm::{Comm, Shares, ordered_sum};
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
@@ -153,6 +154,7 @@ impl Failure {
     /// Exit code (sysexits).
     pub fn code(&self) -> i32 {
         match self {
+            Self::Study(StudyError::Mesh(MeshError::Unreadable(_))) => 74,
             Self::Scene(_) | Self::Study(_) => 65,
             Self::Input(_) | Self::Place(_) | Self::Output(_) => 74,
         }
@@ -267,6 +269,7 @@ fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     let summary = &mut solved.summary;
     describe_run(summary, &source, comm);
     summary.warnings = warnings(&scene, &discrete, comm);
+    summary.mesh_reading_mb = discrete.reading_mb;
     summary.cascade = rows;
     summary.time = table.max_seconds();
     summary.time_total = Some(table.total_seconds);
@@ -300,6 +303,7 @@ fn solve_level(
     let discrete = timer.time("discretisation", || study::discretise_by_cost(scene, costs.as_deref(), comm))?;
     let sizes = study::sizes(&discrete, comm);
     monitor.event(&Event::Sizes { scene: source.scene.clone(), level, ranks: comm.size(), sizes });
+    discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
     if level == source.level {
         warnings(scene, &discrete, comm).into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
     }
@@ -325,11 +329,13 @@ fn check(source: &Source, comm: &dyn Comm) -> Result<i32, Failure> {
         ranks: comm.size(),
         sizes: sizes.clone(),
     });
+    discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
     monitor.event(&Event::Memory { megabytes: memory });
     warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
     if let Some(file) = &source.summary {
         let mut summary = Summary { sizes, warnings, title: scene.title.clone(), ..Summary::default() };
         summary.memory_estimate_mb = Some(memory);
+        summary.mesh_reading_mb = discrete.reading_mb;
         describe_run(&mut summary, source, comm);
         summary.write(comm, file)?;
     }
@@ -339,6 +345,7 @@ fn check(source: &Source, comm: &dyn Comm) -> Result<i32, Failure> {
 /// What the user should know before the run starts.
 fn warnings(scene: &Scene, discrete: &study::Discrete, comm: &dyn Comm) -> Vec<String> {
     let mut warnings = scene.warnings();
+    warnings.extend(discrete.warnings.iter().cloned());
     let subdomains = discrete.decomposition.shares.total();
     if subdomains < comm.size() {
         warnings.push(format!(

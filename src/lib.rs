@@ -6,6 +6,7 @@
 
 pub mod analytic;
 pub mod assembly;
+pub mod bodies;
 pub mod cascade;
 pub mod cli;
 pub mod comm;

@@ -6,6 +6,7 @@ use std::time::SystemTime;
 use thiserror::Error;
 
 use crate::assembly::loads::{self, Traction};
+use crate::bodies::{self, MeshError, Meshes};
 use crate::cascade;
 use crate::comm::{Comm, Shares, ordered_sum};
 use crate::constraint::{ConstraintError, Constraints, Kind, Support};
@@ -13,7 +14,7 @@ use crate::contact::surface::GatheredSurface;
 use crate::contact::{ContactError, ContactPair, matching};
 use crate::decomposition::bricks::Boxes;
 use crate::decomposition::twins::twins;
-use crate::decomposition::{self, BodyMesh, Cut, Decomposition, Surface};
+use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
@@ -26,9 +27,9 @@ use crate::feti::projector::Projector;
 use crate::feti::schur::Schur;
 use crate::feti::space::RowSpace;
 use crate::material::Material;
-use crate::mesh::{Brick, Face};
+use crate::mesh::Face;
 use crate::monitor::events::Event;
-use crate::monitor::timing::Timer;
+use crate::monitor::timing::{Timer, peak_rss_mb};
 use crate::newton::{self, Method, ProgramSettings, Settings, Solution, StepRecord, StepSolver, TornProblem, Watch};
 use crate::qp::mprgp::Expansion;
 use crate::results::agree::agree;
@@ -42,6 +43,9 @@ use crate::scene::{self, Scene, SurfaceName};
 /// Why a scene has no discrete problem; the same on every rank.
 #[derive(Debug, Error)]
 pub enum StudyError {
+    /// A mesh file is missing or bad.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     /// Contact surfaces cannot be paired.
     #[error(transparent)]
     Contact(#[from] ContactError),
@@ -71,6 +75,12 @@ pub struct Discrete {
     pub tractions: Vec<Traction>,
     /// Own rows of B.
     pub constraints: Constraints,
+    /// What the user should know of the meshes.
+    pub warnings: Vec<String>,
+    /// Indices of the surfaces in contact.
+    pub contact: Vec<usize>,
+    /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
+    pub reading_mb: Option<f64>,
 }
 
 /// Discretises a scene. Collective.
@@ -86,30 +96,26 @@ pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError
 /// # Errors
 /// As there.
 pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm) -> Result<Discrete, StudyError> {
-    let names: Vec<&String> = scene.body.keys().collect();
-    let bodies = bodies(scene);
+    let Meshes { bodies, tets, warnings } = Meshes::new(scene, comm)?;
     let materials = scene.body.values().map(|b| material(&scene.material[&b.material])).collect();
-    let surface = |name: &SurfaceName| Surface {
-        body: names.iter().position(|n| **n == name.body).expect("a checked scene names its bodies"),
-        face: Face::ALL[name.face as usize],
+    let surface = |name: &SurfaceName| {
+        let body = scene.body.keys().position(|known| *known == name.body).expect("a checked scene names its bodies");
+        let patch = match (bodies[body].brick(), name.face()) {
+            (Some(_), Some(face)) => Patch::Face(Face::ALL[face as usize]),
+            _ => Patch::Named(name.surface.clone()),
+        };
+        Surface { body, patch }
     };
-    let mut surfaces: Vec<Surface> = scene
-        .support
-        .values()
-        .map(|s| &s.surface)
-        .chain(scene.load.values().map(|l| &l.surface))
-        .chain(scene.contact.values().flat_map(|c| [&c.slave, &c.master]))
-        .map(surface)
-        .collect();
+    let mut surfaces: Vec<Surface> = scene.surfaces().map(surface).collect();
     surfaces.sort_unstable();
     surfaces.dedup();
     let index = |name: &SurfaceName| surfaces.binary_search(&surface(name)).expect("every named surface is listed");
+    let contact: Vec<usize> = scene.contact.values().flat_map(|c| [index(&c.slave), index(&c.master)]).collect();
 
-    let cut = match scene.decomposition {
-        scene::Decomposition::Bricks { cells } => Cut::Bricks(cells),
-        scene::Decomposition::Metis { subdomains } => Cut::Metis(subdomains),
-    };
-    let decomposition = decomposition::tear(&bodies, &surfaces, cut, costs, comm);
+    let torn = Bodies { bodies: &bodies, meshes: &tets, surfaces: &surfaces, contact: &contact };
+    let decomposition = decomposition::tear(&torn, cut(&scene.decomposition, &bodies), costs, comm);
+    drop(tets);
+    let reading_mb = reading_mb(&bodies, comm);
 
     let mut pairs = Vec::new();
     for (number, (name, contact)) in scene.contact.iter().enumerate() {
@@ -129,12 +135,41 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
     let constraints: Result<_, ConstraintError> = Constraints::new(comm, &decomposition, &supports, &pairs);
     let constraints = agree(comm, "supports", constraints).map_err(StudyError::Supports)?;
-    Ok(Discrete { bodies, materials, surfaces, decomposition, pairs, supports, tractions, constraints })
+    Ok(Discrete {
+        bodies,
+        materials,
+        surfaces,
+        decomposition,
+        pairs,
+        supports,
+        tractions,
+        constraints,
+        warnings,
+        contact,
+        reading_mb,
+    })
 }
 
-fn bodies(scene: &Scene) -> Vec<BodyMesh> {
-    let brick = |b: &scene::Body| Brick { origin: b.brick.origin, size: b.brick.size, cells: b.brick.cells };
-    decomposition::number_bodies(scene.body.values().map(brick).collect())
+/// Rank 0's largest resident memory so far if it has read a mesh. Collective.
+fn reading_mb(bodies: &[BodyMesh], comm: &dyn Comm) -> Option<f64> {
+    let mut megabytes = [peak_rss_mb().unwrap_or(f64::NAN)];
+    comm.broadcast(&mut megabytes);
+    let has_read = bodies.iter().any(|body| body.brick().is_none());
+    Some(megabytes[0]).filter(|megabytes| has_read && megabytes.is_finite())
+}
+
+/// How the scene wants its bodies cut.
+fn cut(wanted: &scene::Decomposition, bodies: &[BodyMesh]) -> Cut {
+    let divides =
+        |body: &BodyMesh| body.brick().is_some_and(|b| (0..3).all(|a| b.cells[a] % scene::PAPER_CELLS[a] == 0));
+    match *wanted {
+        scene::Decomposition::Bricks { cells } => Cut::Bricks(cells),
+        scene::Decomposition::Auto if bodies.iter().all(divides) => Cut::Bricks(scene::PAPER_CELLS),
+        scene::Decomposition::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
+        scene::Decomposition::Metis { subdomains: None } | scene::Decomposition::Auto => {
+            Cut::Metis(cost::subdomains(&bodies.iter().map(|b| b.counts().elements).collect::<Vec<_>>()))
+        }
+    }
 }
 
 fn material(m: &scene::Material) -> Material {
@@ -147,7 +182,8 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
     let space = RowSpace::new(comm, &decomposition.shares, constraints);
     let mut partial = Vec::new();
     for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
-        let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0];
+        let touches = subdomain.facets.iter().any(|facet| discrete.contact.contains(&facet.surface));
+        let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0, f64::from(touches)];
         for &row in rows {
             counts[match constraints.rows[row as usize].kind {
                 Kind::Gluing => 1,
@@ -157,12 +193,13 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
         }
         partial.extend(counts);
     }
-    let sum: Vec<u64> = space.sum(&partial, 4).into_iter().map(|n| n as u64).collect();
+    let sum: Vec<u64> = space.sum(&partial, 5).into_iter().map(|n| n as u64).collect();
     Sizes {
-        nodes: bodies.iter().map(|b| b.brick.node_count()).sum(),
-        cells: bodies.iter().map(|b| b.brick.cell_count()).sum(),
-        elements: bodies.iter().map(|b| b.brick.element_count()).sum(),
+        nodes: bodies.iter().map(|b| b.counts().nodes).sum(),
+        cells: bodies.iter().map(|b| b.counts().cells).sum(),
+        elements: bodies.iter().map(|b| b.counts().elements).sum(),
         subdomains: decomposition.shares.total() as u64,
+        contact_subdomains: sum[4],
         primal_dofs: sum[0],
         gluing_rows: sum[1],
         dirichlet_rows: sum[2],
@@ -227,9 +264,9 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
 /// What the subdomains of a finer mesh are likely to cost, from where a solved scene yields. `None` if they are not known
 /// before the mesh is cut. Collective.
 pub fn expected_costs(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<u64>> {
-    let scene::Decomposition::Bricks { cells } = fine.decomposition else { return None };
+    let bodies = bodies::bricks(fine)?;
+    let Cut::Bricks(cells) = cut(&fine.decomposition, &bodies) else { return None };
     let (coarse, solved) = coarse;
-    let bodies = bodies(fine);
     let boxes = Boxes::new(&bodies, cells);
     let material = |body: usize| &coarse.materials[body];
     Some(cascade::costs(comm, (&coarse.bodies, &coarse.decomposition.subdomains, &solved.u), material, &boxes))

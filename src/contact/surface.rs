@@ -80,6 +80,7 @@ pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decomposition::Patch;
     use crate::fixture::{RANKS, on_ranks, two_bricks, two_bricks_by_metis};
 
     #[test]
@@ -90,19 +91,19 @@ mod tests {
                     let (bodies, surfaces) = (&setup.discrete.bodies, &setup.discrete.surfaces);
                     for (index, surface) in surfaces.iter().enumerate() {
                         let body = &bodies[surface.body];
+                        let (brick, Patch::Face(face)) = (body.brick().unwrap(), &surface.patch) else { panic!() };
                         let found = GatheredSurface::gather(setup.comm, setup.subdomains(), index);
-                        let on = |node: &u64| body.brick.is_on(surface.face, body.brick.node_position(*node));
-                        let nodes: Vec<u64> = (0..body.brick.node_count()).filter(on).collect();
-                        let points: Vec<_> =
-                            nodes.iter().map(|&n| body.brick.coordinates(body.brick.node_position(n))).collect();
+                        let on = |node: &u64| brick.is_on(*face, brick.node_position(*node));
+                        let nodes: Vec<u64> = (0..brick.node_count()).filter(on).collect();
+                        let points: Vec<_> = nodes.iter().map(|&n| brick.coordinates(brick.node_position(n))).collect();
                         assert_eq!(found.nodes, nodes.iter().map(|n| body.first_node + n).collect::<Vec<_>>());
                         assert_eq!(found.points, points);
-                        assert_eq!(found.triangles.len() as u64, body.brick.triangle_count(surface.face));
+                        assert_eq!(found.triangles.len() as u64, brick.triangle_count(*face));
 
                         let of_nodes = found.normals_and_areas();
-                        assert!(of_nodes.iter().all(|(normal, _)| *normal == surface.face.normal()));
-                        let axis = surface.face.axis();
-                        let area: f64 = (0..3).filter(|&a| a != axis).map(|a| body.brick.size[a]).product();
+                        assert!(of_nodes.iter().all(|(normal, _)| *normal == face.normal()));
+                        let axis = face.axis();
+                        let area: f64 = (0..3).filter(|&a| a != axis).map(|a| brick.size[a]).product();
                         let sum: f64 = of_nodes.iter().map(|(_, area)| area).sum();
                         assert!((sum - area).abs() < 1e-14 * area);
                     }

@@ -3,6 +3,7 @@
 use super::shares::{by_cost, interleave};
 use super::{BodyMesh, ElementList};
 use crate::comm::{Comm, Shares};
+use crate::mesh::Brick;
 
 /// The boxes of some bodies and their numbers.
 pub struct Boxes<'a> {
@@ -13,7 +14,7 @@ pub struct Boxes<'a> {
 }
 
 impl<'a> Boxes<'a> {
-    /// Boxes of so many cells; they divide the cells of every body.
+    /// Boxes of so many cells; all bodies are bricks, and these divide their cells.
     pub fn new(bodies: &'a [BodyMesh], cells: [usize; 3]) -> Self {
         let counts: Vec<usize> = bodies.iter().map(|body| along(body, cells).iter().product()).collect();
         Self { bodies, cells, order: interleave(&counts) }
@@ -42,7 +43,7 @@ impl<'a> Boxes<'a> {
     /// Elements of a box, by their numbers within its body.
     fn elements(&self, number: usize) -> ElementList {
         let (body, k) = self.order[number];
-        let brick = &self.bodies[body].brick;
+        let brick = brick(&self.bodies[body]);
         let [nx, ny, _] = along(&self.bodies[body], self.cells);
         let at = [k % nx, k / nx % ny, k / (nx * ny)];
         let low: [usize; 3] = std::array::from_fn(|a| at[a] * self.cells[a]);
@@ -57,9 +58,13 @@ impl<'a> Boxes<'a> {
     }
 }
 
+fn brick(body: &BodyMesh) -> &Brick {
+    body.brick().expect("only bricks are cut into boxes")
+}
+
 /// Number of boxes along each axis.
 fn along(body: &BodyMesh, cells: [usize; 3]) -> [usize; 3] {
-    std::array::from_fn(|a| body.brick.cells[a] / cells[a])
+    std::array::from_fn(|a| brick(body).cells[a] / cells[a])
 }
 
 /// Returns the shares and this rank's element lists; `costs` are those of the boxes, by default equal.

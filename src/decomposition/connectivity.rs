@@ -2,10 +2,12 @@
 //!
 //! A part that falls into pieces, or hangs together by an edge or a vertex only, has more than six rigid body modes.
 
-/// Splits every part into its face-connected pieces. `parts[e]` is the part of element `e`; `begin` and `neighbours`
-/// are the dual graph in compressed rows. Pieces are numbered consecutively in the order of their parts (empty parts
-/// vanish), within a part by first element. Returns the number of pieces.
-pub fn split_into_pieces(parts: &mut [i32], begin: &[i32], neighbours: &[i32]) -> usize {
+use crate::mesh::faces::{Neighbours, OUTSIDE};
+
+/// Splits every part into its face-connected pieces. `parts[e]` is the part of element `e`. Pieces are numbered
+/// consecutively in the order of their parts (empty parts vanish), within a part by first element. Returns the number of
+/// pieces.
+pub fn split_into_pieces(parts: &mut [i32], neighbours: &Neighbours) -> usize {
     let mut pieces = vec![usize::MAX; parts.len()];
     let mut part_of_piece = Vec::new();
     let mut stack = Vec::new();
@@ -18,8 +20,7 @@ pub fn split_into_pieces(parts: &mut [i32], begin: &[i32], neighbours: &[i32]) -
         pieces[seed] = piece;
         stack.push(seed);
         while let Some(element) = stack.pop() {
-            for &other in &neighbours[begin[element] as usize..begin[element + 1] as usize] {
-                let other = other as usize;
+            for other in neighbours.behind[element].into_iter().filter(|&o| o != OUTSIDE).map(|o| o as usize) {
                 if pieces[other] == usize::MAX && parts[other] == parts[element] {
                     pieces[other] = piece;
                     stack.push(other);
@@ -41,15 +42,16 @@ pub fn split_into_pieces(parts: &mut [i32], begin: &[i32], neighbours: &[i32]) -
 
 #[cfg(test)]
 mod tests {
-    use super::split_into_pieces;
+    use super::*;
 
     #[test]
     fn a_part_in_two_pieces_becomes_two_and_empty_parts_vanish() {
         // A chain of five elements; part 0 holds both ends, part 2 is empty.
-        let begin = [0, 1, 3, 5, 7, 8];
-        let neighbours = [1, 0, 2, 1, 3, 2, 4, 3];
+        let next = |k: u32| [k + 1, OUTSIDE, OUTSIDE, k.wrapping_sub(1)];
+        let mut behind: Vec<_> = (0..5).map(next).collect();
+        behind[4][0] = OUTSIDE;
         let mut parts = [0, 1, 1, 3, 0];
-        assert_eq!(split_into_pieces(&mut parts, &begin, &neighbours), 4);
+        assert_eq!(split_into_pieces(&mut parts, &Neighbours { behind, overlapping: 0 }), 4);
         assert_eq!(parts, [0, 2, 2, 3, 1]);
     }
 }

@@ -1,6 +1,12 @@
-//! Partition of each body's dual graph by METIS (Karypis and Kumar 1998), on rank 0; the others receive the numbers of
-//! their own elements. Bodies are cut one by one: a part never spans two bodies.
+//! Partition of each body's dual graph by METIS (Karypis and Kumar 1998), on rank 0. The others receive their own
+//! subdomains: the numbers of elements of bricks, which they generate, and all of other bodies.
+//!
+//! Bodies are cut one by one: a part never spans two bodies. Elements cost the same, as all elements of a body have one
+//! kind and one material. Contact surfaces stay on few subdomains because cutting between two elements at them counts
+//! as much as cutting [`AT_CONTACT`] other faces.
 
+use std::borrow::Cow;
+use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use metis::Graph;
@@ -8,40 +14,51 @@ use metis::option::{Contig, Seed};
 
 use super::connectivity::split_into_pieces;
 use super::shares::{by_cost, interleave};
-use super::{BodyMesh, ElementList};
+use super::{Bodies, Patch, Shape, Subdomain};
 use crate::comm::{Comm, Shares};
+use crate::mesh::brick::indices;
+use crate::mesh::faces::{Neighbours, OUTSIDE, key};
+
+/// How much dearer it is to cut between two elements at a contact surface.
+const AT_CONTACT: i32 = 5;
 
 /// Cuts all bodies into about `parts` parts (more where a part had to be split to be face-connected). Returns the
-/// shares and this rank's element lists.
-pub(crate) fn own_elements(bodies: &[BodyMesh], parts: usize, comm: &dyn Comm) -> (Shares, Vec<ElementList>) {
+/// shares and this rank's subdomains. Collective.
+pub(crate) fn own_subdomains(bodies: &Bodies, parts: usize, comm: &dyn Comm) -> (Shares, Vec<Subdomain>) {
     let mut outgoing = vec![Vec::new(); comm.size()];
     if comm.rank() == 0 {
-        let sizes: Vec<u64> = bodies.iter().map(|body| body.brick.element_count()).collect();
-        let mut lists: Vec<Vec<Vec<u64>>> = Vec::new();
-        for (body, wanted) in bodies.iter().zip(spread(parts, &sizes)) {
-            let (part, count) = partition(body, wanted);
-            let mut of_parts = vec![Vec::new(); count];
-            part.iter().enumerate().for_each(|(element, &p)| of_parts[p as usize].push(element as u64));
-            lists.push(of_parts);
-        }
+        let lists = lists(bodies, parts);
         let order = interleave(&lists.iter().map(Vec::len).collect::<Vec<_>>());
         let costs: Vec<u64> = order.iter().map(|&(body, part)| lists[body][part].len() as u64).collect();
         let shares = by_cost(&costs, comm.size());
-        let mut order = order.into_iter();
-        for (message, &count) in outgoing.iter_mut().zip(&shares.0) {
-            for (body, part) in order.by_ref().take(count) {
-                message.extend([body as u64, lists[body][part].len() as u64]);
-                message.extend(&lists[body][part]);
+        let surfaces: HashMap<_, _> = bodies.meshes.keys().map(|&body| (body, triangles(bodies, body))).collect();
+        for (id, (body, part)) in order.into_iter().enumerate() {
+            let elements = &lists[body][part];
+            let message = &mut outgoing[shares.owner(id)];
+            message.push(body as u64);
+            if let Some(mesh) = bodies.meshes.get(&body) {
+                let first_node = bodies.bodies[body].first_node;
+                Subdomain::of_mesh((id, body), first_node, mesh, elements, &surfaces[&body]).pack(message);
+            } else {
+                message.extend([id as u64, elements.len() as u64]);
+                message.extend(elements);
             }
         }
     }
     let mut message = comm.all_to_all(outgoing).swap_remove(0).into_iter();
-    let mut lists = Vec::new();
-    while let (Some(body), Some(length)) = (message.next(), message.next()) {
-        lists.push((body as usize, message.by_ref().take(length as usize).collect()));
+    let mut own = Vec::new();
+    while let Some(body) = message.next() {
+        own.extend(match bodies.bodies[body as usize].shape {
+            Shape::Tets(_) => Subdomain::unpack(&mut message),
+            Shape::Brick(_) => {
+                let [id, length] = [(); 2].map(|()| message.next().expect("a list is whole") as usize);
+                let elements: Vec<u64> = message.by_ref().take(length).collect();
+                Some(Subdomain::of_brick(id, bodies, body as usize, &elements))
+            }
+        });
     }
-    let counts = comm.all_gather(&[lists.len() as f64], &vec![1; comm.size()]);
-    (Shares(counts.into_iter().map(|n| n as usize).collect()), lists)
+    let counts = comm.all_gather(&[own.len() as f64], &vec![1; comm.size()]);
+    (Shares(counts.into_iter().map(|n| n as usize).collect()), own)
 }
 
 /// Lets one thread at a time into METIS, which draws from the C library's one generator: without it, results would depend
@@ -51,7 +68,22 @@ pub(crate) fn alone() -> MutexGuard<'static, ()> {
     LOCK.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Shares `parts` out over bodies: one each, the others one by one to the body that is farthest below its quota.
+/// For each body its parts, as elements numbered within the body, ascending.
+fn lists(bodies: &Bodies, parts: usize) -> Vec<Vec<Vec<u64>>> {
+    let graphs: Vec<DualGraph> = (0..bodies.bodies.len()).map(|body| DualGraph::new(bodies, body)).collect();
+    let sizes: Vec<u64> = graphs.iter().flat_map(|graph| graph.pieces.iter().map(|p| p.len() as u64)).collect();
+    let mut wanted = spread(parts, &sizes).into_iter();
+    let of_body = |graph: &DualGraph| {
+        let (part, count) = graph.partition(&mut wanted);
+        let mut lists = vec![Vec::new(); count];
+        part.iter().enumerate().for_each(|(element, &p)| lists[p as usize].push(element as u64));
+        lists
+    };
+    graphs.iter().map(of_body).collect()
+}
+
+/// Shares `parts` out over pieces of these sizes: one each, the others one by one to the piece that is farthest below its
+/// quota.
 fn spread(parts: usize, sizes: &[u64]) -> Vec<usize> {
     let total: u64 = sizes.iter().sum();
     let quota: Vec<f64> = sizes.iter().map(|&n| parts as f64 * n as f64 / total as f64).collect();
@@ -64,26 +96,103 @@ fn spread(parts: usize, sizes: &[u64]) -> Vec<usize> {
     result
 }
 
-/// Part of each element of a body, and the number of parts; each part is face-connected.
-fn partition(body: &BodyMesh, wanted: usize) -> (Vec<i32>, usize) {
-    let elements = body.brick.element_count();
-    let mut nodes = Vec::with_capacity(4 * elements as usize);
-    nodes.extend((0..elements).flat_map(|e| body.element(e)).map(|node| node as i32));
-    let begins: Vec<i32> = (0..=elements as i32).map(|e| 4 * e).collect();
-    let dual = metis::mesh_to_dual(&begins, &nodes, 3).expect("a brick's mesh has a dual graph");
-    let (begin, neighbours) = (dual.xadj(), dual.adjncy());
-    let mut parts = vec![0; elements as usize];
-    if wanted > 1 {
+/// Named surfaces of the boundary triangles of a mesh, by ascending nodes.
+fn triangles(bodies: &Bodies, body: usize) -> HashMap<[u32; 3], Vec<usize>> {
+    let mut result: HashMap<_, Vec<usize>> = HashMap::new();
+    for (index, surface) in bodies.surfaces.iter().enumerate().filter(|(_, s)| s.body == body) {
+        if let Patch::Named(name) = &surface.patch {
+            for &triangle in bodies.meshes[&body].surface(name) {
+                result.entry(key(triangle)).or_default().push(index);
+            }
+        }
+    }
+    result
+}
+
+/// The elements of a body, those that share a face being neighbours.
+struct DualGraph {
+    neighbours: Neighbours,
+    /// Elements of each face-connected piece of the body, ascending.
+    pieces: Vec<Vec<u32>>,
+    /// Whether an element has a node on a contact surface.
+    at_contact: Vec<bool>,
+}
+
+impl DualGraph {
+    fn new(bodies: &Bodies, body: usize) -> Self {
+        let tets: Cow<[[u32; 4]]> = match &bodies.bodies[body].shape {
+            Shape::Brick(brick) => {
+                let cells = indices(&brick.all_cells());
+                cells.flat_map(|cell| brick.tets(cell)).map(|tet| tet.map(|n| n as u32)).collect()
+            }
+            Shape::Tets(_) => Cow::Borrowed(&bodies.meshes[&body].tets),
+        };
+        let nodes = bodies.bodies[body].counts().nodes as usize;
+        let neighbours = Neighbours::new(nodes, &tets);
+        let mut piece_of = vec![0; tets.len()];
+        let mut pieces = vec![Vec::new(); split_into_pieces(&mut piece_of, &neighbours)];
+        (0..).zip(piece_of).for_each(|(element, piece)| pieces[piece as usize].push(element));
+        let mut touching = vec![false; nodes];
+        contact_nodes(bodies, body).into_iter().for_each(|node| touching[node as usize] = true);
+        let at_contact = tets.iter().map(|tet| tet.iter().any(|&n| touching[n as usize])).collect();
+        Self { neighbours, pieces, at_contact }
+    }
+
+    /// Part of each element, and the number of parts, each of which is face-connected; `wanted` tells how many parts to
+    /// ask for, piece after piece.
+    fn partition(&self, wanted: &mut impl Iterator<Item = usize>) -> (Vec<i32>, usize) {
+        let mut parts = vec![0; self.at_contact.len()];
+        let mut first = 0;
+        let mut local = vec![0; parts.len()];
+        for (piece, wanted) in self.pieces.iter().zip(wanted) {
+            (0..).zip(piece).for_each(|(k, &element)| local[element as usize] = k);
+            let cut = if wanted > 1 { self.cut(piece, &local, wanted as i32) } else { vec![0; piece.len()] };
+            piece.iter().zip(cut).for_each(|(&element, part)| parts[element as usize] = first + part);
+            first += wanted as i32;
+        }
+        let count = split_into_pieces(&mut parts, &self.neighbours);
+        (parts, count)
+    }
+
+    /// Part of each element of a piece; `local` has the places of its elements.
+    fn cut(&self, piece: &[u32], local: &[i32], wanted: i32) -> Vec<i32> {
+        let (mut begin, mut adjacency, mut weights) = (vec![0], Vec::new(), Vec::new());
+        for &element in piece {
+            for other in self.neighbours.behind[element as usize].into_iter().filter(|&o| o != OUTSIDE) {
+                adjacency.push(local[other as usize]);
+                let both = self.at_contact[element as usize] && self.at_contact[other as usize];
+                weights.push(if both { AT_CONTACT } else { 1 });
+            }
+            begin.push(adjacency.len() as i32);
+        }
+        let mut parts = vec![0; piece.len()];
         let _alone = alone();
-        Graph::new(1, wanted as i32, begin, neighbours)
-            .expect("METIS made this graph itself")
+        Graph::new(1, wanted, &begin, &adjacency)
+            .expect("the rows are in order")
+            .set_adjwgt(&weights)
             .set_option(Contig(true))
             .set_option(Seed(1))
             .part_kway(&mut parts)
-            .expect("the dual graph of a brick is connected");
+            .expect("the graph of a piece is connected");
+        parts
     }
-    let count = split_into_pieces(&mut parts, begin, neighbours);
-    (parts, count)
+}
+
+/// Nodes of a body on contact surfaces, some several times.
+fn contact_nodes(bodies: &Bodies, body: usize) -> Vec<u64> {
+    let nodes = |patch: &Patch| -> Vec<u64> {
+        match (&bodies.bodies[body].shape, patch) {
+            (Shape::Brick(brick), Patch::Face(face)) => {
+                indices(&brick.nodes_on(*face)).map(|at| brick.node(at)).collect()
+            }
+            (_, Patch::Named(name)) => {
+                bodies.meshes[&body].surface(name).as_flattened().iter().map(|&n| u64::from(n)).collect()
+            }
+            (Shape::Tets(_), Patch::Face(_)) => Vec::new(),
+        }
+    };
+    let surfaces = bodies.contact.iter().map(|&index| &bodies.surfaces[index]).filter(|s| s.body == body);
+    surfaces.flat_map(|surface| nodes(&surface.patch)).collect()
 }
 
 #[cfg(test)]
@@ -91,7 +200,7 @@ mod tests {
     use super::spread;
 
     #[test]
-    fn parts_are_spread_by_size_and_every_body_gets_one() {
+    fn parts_are_spread_by_size_and_every_piece_gets_one() {
         assert_eq!(spread(10, &[600, 300, 100]), [6, 3, 1]);
         assert_eq!(spread(3, &[1000, 1, 1]), [1, 1, 1]);
         assert_eq!(spread(7, &[1, 1]), [4, 3]);

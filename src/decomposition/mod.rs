@@ -6,6 +6,7 @@
 
 pub mod bricks;
 pub mod connectivity;
+pub mod cost;
 pub mod interface;
 pub mod metis;
 pub mod shares;
@@ -15,41 +16,94 @@ pub mod twins;
 pub use interface::InterfaceNode;
 pub use subdomain::{Facet, Subdomain};
 
+use std::collections::BTreeMap;
+
 use crate::comm::{Comm, Shares};
 use crate::mesh::brick::Brick;
 use crate::mesh::face::Face;
+use crate::mesh::tets::TetMesh;
 
-/// A surface that a support, load or contact names: a face of a brick body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// A surface that a support, load or contact names.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Surface {
     /// Index of the body.
     pub body: usize,
-    /// Which of its faces.
-    pub face: Face,
+    /// Where on the body.
+    pub patch: Patch,
 }
 
-/// One body's mesh before tearing: a brick, numbered behind the bodies before it.
+/// Part of the boundary of a body.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Patch {
+    /// A face of a brick.
+    Face(Face),
+    /// A named surface of a mesh.
+    Named(String),
+}
+
+/// What every rank knows of a body's mesh before tearing; its nodes are numbered behind those of the bodies before it.
 #[derive(Clone, Debug)]
 pub struct BodyMesh {
-    /// The generator of nodes and elements.
-    pub brick: Brick,
+    /// Where nodes and elements come from.
+    pub shape: Shape,
     /// Number of nodes of all bodies before this one.
     pub first_node: u64,
-    /// Number of elements of all bodies before this one.
-    pub first_element: u64,
+}
+
+/// Where nodes and elements of a body come from.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// Any rank can generate them.
+    Brick(Brick),
+    /// Rank 0 has them, as a [`TetMesh`], until they are torn; the others know how many there are.
+    Tets(Counts),
+}
+
+/// Sizes of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Counts {
+    /// Nodes.
+    pub nodes: u64,
+    /// Cells before they were split into elements.
+    pub cells: u64,
+    /// Elements.
+    pub elements: u64,
 }
 
 impl BodyMesh {
-    /// Nodes of an element, both numbered within the body.
-    pub fn element(&self, element: u64) -> [u64; 4] {
-        self.brick.tets(self.brick.cell_position(element / 6))[(element % 6) as usize]
+    /// The brick, if the body is one.
+    pub fn brick(&self) -> Option<&Brick> {
+        match &self.shape {
+            Shape::Brick(brick) => Some(brick),
+            Shape::Tets(_) => None,
+        }
     }
+
+    /// Sizes of the mesh.
+    pub fn counts(&self) -> Counts {
+        match &self.shape {
+            Shape::Brick(b) => Counts { nodes: b.node_count(), cells: b.cell_count(), elements: b.element_count() },
+            Shape::Tets(counts) => *counts,
+        }
+    }
+}
+
+/// All bodies and what is done with their surfaces.
+pub struct Bodies<'a> {
+    /// In the order of their names.
+    pub bodies: &'a [BodyMesh],
+    /// On rank 0 the meshes of bodies that are no bricks, by index; empty elsewhere.
+    pub meshes: &'a BTreeMap<usize, TetMesh>,
+    /// Named surfaces; facets and interface nodes refer to them by index.
+    pub surfaces: &'a [Surface],
+    /// Indices of those that may touch another body.
+    pub contact: &'a [usize],
 }
 
 /// How to cut the bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cut {
-    /// Boxes of so many cells; they divide the cells of every body.
+    /// Boxes of so many cells; all bodies are bricks, and these divide their cells.
     Bricks([usize; 3]),
     /// So many parts in all, by METIS, at least one a body.
     Metis(usize),
@@ -73,39 +127,30 @@ impl Decomposition {
     }
 }
 
-/// Lays bodies one behind the other in one numbering of nodes and elements.
-pub fn number_bodies(bricks: Vec<Brick>) -> Vec<BodyMesh> {
-    let (mut first_node, mut first_element) = (0, 0);
-    bricks
+/// Lays bodies one behind the other in one numbering of nodes.
+pub fn number_bodies(shapes: Vec<Shape>) -> Vec<BodyMesh> {
+    let mut first_node = 0;
+    shapes
         .into_iter()
-        .map(|brick| {
-            let body = BodyMesh { first_node, first_element, brick };
-            first_node += body.brick.node_count();
-            first_element += body.brick.element_count();
+        .map(|shape| {
+            let body = BodyMesh { first_node, shape };
+            first_node += body.counts().nodes;
             body
         })
         .collect()
 }
 
-/// Tears the bodies; facets and interface nodes refer to `surfaces` by index. Boxes of [`Cut::Bricks`] are spread over the
-/// ranks by their `costs` if given, otherwise every rank gets as many subdomains. Collective.
-pub fn tear(
-    bodies: &[BodyMesh],
-    surfaces: &[Surface],
-    cut: Cut,
-    costs: Option<&[u64]>,
-    comm: &dyn Comm,
-) -> Decomposition {
-    let (shares, lists) = match cut {
-        Cut::Bricks(cells) => bricks::own_elements(bodies, cells, costs, comm),
-        Cut::Metis(parts) => metis::own_elements(bodies, parts, comm),
+/// Tears the bodies. Boxes of [`Cut::Bricks`] are spread over the ranks by their `costs` if given, otherwise every rank
+/// gets as many subdomains. Collective.
+pub fn tear(bodies: &Bodies, cut: Cut, costs: Option<&[u64]>, comm: &dyn Comm) -> Decomposition {
+    let (shares, subdomains) = match cut {
+        Cut::Bricks(cells) => {
+            let (shares, lists) = bricks::own_elements(bodies.bodies, cells, costs, comm);
+            let ids = shares.begin(comm.rank())..;
+            (shares, ids.zip(lists).map(|(id, (body, list))| Subdomain::of_brick(id, bodies, body, &list)).collect())
+        }
+        Cut::Metis(parts) => metis::own_subdomains(bodies, parts, comm),
     };
-    let first = shares.begin(comm.rank());
-    let subdomains: Vec<_> = lists
-        .into_iter()
-        .enumerate()
-        .map(|(k, (body, elements))| Subdomain::new(first + k, body, &bodies[body], &elements, surfaces))
-        .collect();
     let interface = interface::share(comm, &subdomains);
     Decomposition { shares, subdomains, interface }
 }

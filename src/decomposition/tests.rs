@@ -1,6 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Facet, Subdomain};
+use super::{Facet, Patch, Subdomain};
 use crate::comm::threads;
 use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis};
 use crate::scene::Scene;
@@ -30,7 +30,7 @@ fn sizes_are_those_of_the_papers_table_2() {
         let scene = Scene::load("two-blocks", level, &[]).unwrap();
         let found = threads::run(ranks, |comm| {
             let discrete = discretise(&scene, comm).unwrap();
-            let nodes: u64 = discrete.bodies.iter().map(|body| body.brick.node_count()).sum();
+            let nodes: u64 = discrete.bodies.iter().map(|body| body.counts().nodes).sum();
             assert_eq!((nodes, discrete.decomposition.shares.total()), (nodes, subdomains));
             let found = sizes(&discrete, comm);
             assert_eq!([found.gluing_rows, found.dirichlet_rows, found.contact_rows], rows);
@@ -76,7 +76,7 @@ fn every_element_is_in_exactly_one_subdomain() {
                 .discrete
                 .bodies
                 .iter()
-                .flat_map(|b| (0..b.brick.element_count()).map(|e| b.element(e).map(|n| b.first_node + n)))
+                .flat_map(|b| (0..b.counts().elements).map(|e| b.brick().unwrap().tet(e).map(|n| b.first_node + n)))
                 .collect();
             torn.sort_unstable();
             whole.sort_unstable();
@@ -133,8 +133,9 @@ fn surfaces_of_nodes(setup: &Setup) -> BTreeMap<u64, Vec<u32>> {
     let mut result: BTreeMap<u64, Vec<u32>> = BTreeMap::new();
     for (index, surface) in setup.discrete.surfaces.iter().enumerate() {
         let body = &setup.discrete.bodies[surface.body];
-        for node in 0..body.brick.node_count() {
-            if body.brick.is_on(surface.face, body.brick.node_position(node)) {
+        let (brick, Patch::Face(face)) = (body.brick().unwrap(), &surface.patch) else { panic!("bodies are bricks") };
+        for node in 0..brick.node_count() {
+            if brick.is_on(*face, brick.node_position(node)) {
                 result.entry(body.first_node + node).or_default().push(index as u32);
             }
         }

@@ -17,6 +17,11 @@ pub enum Event {
         /// Sizes of the problem.
         sizes: Sizes,
     },
+    /// Mesh files are read and sent out.
+    Reading {
+        /// Largest resident memory of rank 0 until then, in MiB.
+        megabytes: f64,
+    },
     /// What a run would take, from `check`.
     Memory {
         /// All ranks together, in MiB.

@@ -31,6 +31,7 @@ impl Plain {
                 self.newton_header_written = false;
                 size_lines(scene, *level, *ranks, sizes)
             }
+            Event::Reading { megabytes } => vec![format!("  {:<16}{megabytes:>12.0}  MiB, rank 0", "reading meshes")],
             Event::Memory { megabytes } => {
                 vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together", "memory estimate")]
             }
@@ -52,10 +53,13 @@ impl Plain {
 fn size_lines(scene: &str, level: usize, ranks: usize, sizes: &Sizes) -> Vec<String> {
     let line = |what: &str, count: u64, detail: String| format!("  {what:<16}{count:>12}{detail}");
     let (glue, supports, contact) = (sizes.gluing_rows, sizes.dirichlet_rows, sizes.contact_rows);
-    let share = match ranks {
+    let mut share = match ranks {
         1 => "  on 1 rank".to_owned(),
         _ => format!("  on {ranks} ranks"),
     };
+    if contact > 0 {
+        share += &format!(", {} at contact surfaces", sizes.contact_subdomains);
+    }
     vec![
         format!("{scene}, level {level}"),
         line("nodes", sizes.nodes, String::new()),

@@ -66,6 +66,8 @@ pub struct Summary {
     pub time: BTreeMap<String, f64>,
     /// Sum over the ranks of their largest resident memory, in MiB.
     pub peak_rss_mb: Option<f64>,
+    /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
+    pub mesh_reading_mb: Option<f64>,
     /// What a run would take, in MiB; from `check` only.
     pub memory_estimate_mb: Option<f64>,
     /// Why the run failed.
@@ -89,6 +91,8 @@ pub struct Sizes {
     pub elements: u64,
     /// Subdomains.
     pub subdomains: u64,
+    /// Those with a triangle on a contact surface.
+    pub contact_subdomains: u64,
     /// Displacements of the torn problem.
     pub primal_dofs: u64,
     /// All rows.

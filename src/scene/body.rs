@@ -1,4 +1,4 @@
-//! Bodies: a material, an element and a shape. The only shape so far is the brick with axis-parallel edges.
+//! Bodies: a material, an element and a shape, which is a brick with axis-parallel edges or a volume of a mesh file.
 
 use std::fmt;
 
@@ -6,21 +6,127 @@ use serde::{Deserialize, Serialize};
 
 /// One body of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Section", into = "Section")]
 pub struct Body {
     /// Name of its material.
     pub material: String,
     /// Finite element of its mesh.
     pub element: Element,
-    /// Shape and mesh density.
-    pub brick: Brick,
+    /// Shape and mesh.
+    pub shape: Shape,
+}
+
+/// What a body looks like.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// A box, meshed by its number of cells.
+    Brick(Brick),
+    /// A volume of a mesh file.
+    Gmsh(Gmsh),
+}
+
+impl Body {
+    /// The brick, if the body is one.
+    pub fn brick(&self) -> Option<&Brick> {
+        match &self.shape {
+            Shape::Brick(brick) => Some(brick),
+            Shape::Gmsh(_) => None,
+        }
+    }
+
+    /// The mesh file, if the body is from one.
+    pub fn gmsh(&self) -> Option<&Gmsh> {
+        match &self.shape {
+            Shape::Brick(_) => None,
+            Shape::Gmsh(gmsh) => Some(gmsh),
+        }
+    }
+}
+
+/// The section as written.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Section {
+    material: String,
+    element: Element,
+    brick: Option<Brick>,
+    gmsh: Option<Gmsh>,
+}
+
+/// Not exactly one shape.
+#[derive(Debug, thiserror::Error)]
+enum ShapeError {
+    #[error(
+        "a body needs a shape: brick = {{ origin, size, cells }} or gmsh = {{ file = \"PART.msh\", volume = \"NAME\" }}"
+    )]
+    None,
+    #[error("a body has one shape, but both brick and gmsh are given: remove one")]
+    Both,
+}
+
+impl TryFrom<Section> for Body {
+    type Error = ShapeError;
+
+    fn try_from(section: Section) -> Result<Self, ShapeError> {
+        let Section { material, element, brick, gmsh } = section;
+        let shape = match (brick, gmsh) {
+            (Some(brick), None) => Shape::Brick(brick),
+            (None, Some(gmsh)) => Shape::Gmsh(gmsh),
+            (None, None) => return Err(ShapeError::None),
+            (Some(_), Some(_)) => return Err(ShapeError::Both),
+        };
+        Ok(Self { material, element, shape })
+    }
+}
+
+impl From<Body> for Section {
+    fn from(body: Body) -> Self {
+        let Body { material, element, shape } = body;
+        let (brick, gmsh) = match shape {
+            Shape::Brick(brick) => (Some(brick), None),
+            Shape::Gmsh(gmsh) => (None, Some(gmsh)),
+        };
+        Self { material, element, brick, gmsh }
+    }
+}
+
+/// A physical volume of a Gmsh file, scaled, then rotated about an axis through the origin, then moved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gmsh {
+    /// The mesh file; relative paths are from the scene file.
+    pub file: String,
+    /// Name of the physical volume, or its number if it has no name; may be absent if there is only one.
+    pub volume: Option<String>,
+    /// Factor of all coordinates, positive.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// A rotation.
+    pub rotate: Option<Rotation>,
+    /// What is added to all coordinates in the end.
+    #[serde(default)]
+    pub translate: [f64; 3],
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// A rotation about an axis through the origin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rotation {
+    /// Direction, not zero.
+    pub axis: [f64; 3],
+    /// Angle in degrees, counter-clockwise seen against the axis.
+    pub angle_deg: f64,
 }
 
 /// Finite elements to choose from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Element {
-    /// Linear tetrahedra, six to a cell.
+    /// Linear tetrahedra, six to a hexahedral cell.
     Tet4,
 }
 

@@ -6,13 +6,13 @@
 use std::fmt::Debug;
 
 use super::Scene;
-use super::body::{Axis, Body, Brick};
+use super::body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
 use super::decomposition::Decomposition;
 use super::error::Fault;
-use super::held;
+use super::held::Held;
 use super::material::Material;
 use super::solver::Solver;
-use super::surface::{Contact, Load, Support, SurfaceName};
+use super::surface::{Contact, Face, Load, Support, SurfaceName};
 
 type Checked = Result<(), Fault>;
 
@@ -70,7 +70,13 @@ fn material(key: &str, material: &Material) -> Checked {
 fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
     let rule = || format!("no such material: known are {}", names(scene.material.keys()));
     require(scene.material.contains_key(&body.material), &format!("{key}.material"), &body.material, rule())?;
-    let Brick { origin, size, cells } = body.brick;
+    match &body.shape {
+        Shape::Brick(it) => brick(key, it),
+        Shape::Gmsh(it) => gmsh(&format!("{key}.gmsh"), it),
+    }
+}
+
+fn brick(key: &str, &Brick { origin, size, cells }: &Brick) -> Checked {
     all_finite(&format!("{key}.brick.origin"), origin)?;
     let positive = size.iter().all(|edge| edge.is_finite() && *edge > 0.0);
     require(positive, &format!("{key}.brick.size"), size, "edges must be positive and finite")?;
@@ -81,9 +87,30 @@ fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
     require(countable, &key, cells, "too many cells (level included) to be counted")
 }
 
+fn gmsh(key: &str, Gmsh { file, scale, rotate, translate, .. }: &Gmsh) -> Checked {
+    require(!file.is_empty(), &format!("{key}.file"), file, "must be the path of a mesh file")?;
+    require(scale.is_finite() && *scale > 0.0, &format!("{key}.scale"), scale, "must be positive and finite")?;
+    if let Some(Rotation { axis, angle_deg }) = rotate {
+        let length: f64 = axis.iter().map(|x| x * x).sum();
+        let rule = "must be a direction: finite numbers, not all zero";
+        require(length.is_normal(), &format!("{key}.rotate.axis"), axis, rule)?;
+        require(angle_deg.is_finite(), &format!("{key}.rotate.angle_deg"), angle_deg, "must be finite")?;
+    }
+    all_finite(&format!("{key}.translate"), *translate)
+}
+
+/// Surfaces of mesh files are looked up when these are read.
 fn surface(scene: &Scene, key: &str, name: &SurfaceName) -> Checked {
-    let rule = || format!("no body `{}`: known are {}", name.body, names(scene.body.keys()));
-    require(scene.body.contains_key(&name.body), key, name.to_string(), rule())
+    let Some(body) = scene.body.get(&name.body) else {
+        let rule = format!("no body `{}`: known are {}", name.body, names(scene.body.keys()));
+        return require(false, key, name.to_string(), rule);
+    };
+    let SurfaceName { body: of, surface } = name;
+    let rule = || {
+        let faces = Face::ALL.map(Face::name).join(", ");
+        format!("`{surface}` is not a face of body `{of}`: a brick has {faces}")
+    };
+    require(body.brick().is_none() || name.face().is_some(), key, name.to_string(), rule())
 }
 
 fn support(scene: &Scene, key: &str, support: &Support) -> Checked {
@@ -119,31 +146,40 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
 
 fn decomposition(scene: &Scene) -> Checked {
     match scene.decomposition {
+        Decomposition::Auto => Ok(()),
         Decomposition::Bricks { cells } => {
             let key = "decomposition.cells";
             require(!cells.contains(&0), key, cells, "must be at least 1 along each axis")?;
-            for (name, body) in &scene.body {
-                for axis in Axis::ALL {
-                    let (of_body, part) = (body.brick.cells[axis.index()], cells[axis.index()]);
-                    let rule = || {
-                        format!(
-                            "{part} does not divide the {of_body} cells (level included) of body {name} along {axis}"
-                        )
-                    };
-                    require(of_body.is_multiple_of(part), key, cells, rule())?;
-                }
-            }
-            Ok(())
+            scene.body.iter().try_for_each(|(name, body)| divided(name, body, cells))
         }
-        Decomposition::Metis { subdomains } => {
+        Decomposition::Metis { subdomains: None } => Ok(()),
+        Decomposition::Metis { subdomains: Some(subdomains) } => {
             let key = "decomposition.subdomains";
             let bodies = scene.body.len();
             require(subdomains >= bodies, key, subdomains, format!("each of the {bodies} bodies needs at least one"))?;
-            let per_body = scene.body.values().map(|body| body.brick.cell_count() * body.element.per_cell());
-            let elements = per_body.fold(0_usize, usize::saturating_add);
+            // Elements of mesh files are counted when these are read.
+            let per_body: Option<Vec<usize>> =
+                scene.body.values().map(|b| Some(b.brick()?.cell_count() * b.element.per_cell())).collect();
+            let Some(per_body) = per_body else { return Ok(()) };
+            let elements = per_body.into_iter().fold(0_usize, usize::saturating_add);
             require(subdomains <= elements, key, subdomains, format!("there are only {elements} elements to share out"))
         }
     }
+}
+
+fn divided(name: &str, body: &Body, cells: [usize; 3]) -> Checked {
+    let key = "decomposition.cells";
+    let Some(brick) = body.brick() else {
+        let rule = format!("body {name} is from a mesh file and has no rows of cells: use method = \"metis\"");
+        return require(false, key, cells, rule);
+    };
+    for axis in Axis::ALL {
+        let (of_body, part) = (brick.cells[axis.index()], cells[axis.index()]);
+        let rule =
+            || format!("{part} does not divide the {of_body} cells (level included) of body {name} along {axis}");
+        require(of_body.is_multiple_of(part), key, cells, rule())?;
+    }
+    Ok(())
 }
 
 fn solver(solver: &Solver) -> Checked {
@@ -161,13 +197,15 @@ fn solver(solver: &Solver) -> Checked {
     Ok(())
 }
 
-/// Faces of a brick that are not opposite share nodes, where two supports must not prescribe different values.
+/// Faces of a brick that are not opposite share nodes, where two supports must not prescribe different values. Surfaces
+/// of mesh files are compared node by node when rows are made.
 fn compatible_supports(scene: &Scene) -> Checked {
     for (index, (name, one)) in scene.support.iter().enumerate() {
         for (other_name, other) in scene.support.iter().take(index) {
-            let (face, other_face) = (one.surface.face, other.surface.face);
-            let meet =
-                one.surface.body == other.surface.body && (face == other_face || face.axis() != other_face.axis());
+            let (Some(face), Some(other_face)) = (one.surface.face(), other.surface.face()) else { continue };
+            let meet = one.surface.body == other.surface.body
+                && scene.body[&one.surface.body].brick().is_some()
+                && (face == other_face || face.axis() != other_face.axis());
             for axis in Axis::ALL.into_iter().filter(|_| meet) {
                 let (Some(value), Some(other_value)) = (one.prescribed(axis), other.prescribed(axis)) else { continue };
                 if value != other_value {
@@ -184,16 +222,10 @@ fn compatible_supports(scene: &Scene) -> Checked {
     Ok(())
 }
 
-/// A body must be held by its supports unless contact may do so.
+/// A brick must be held by its supports unless contact may do so.
 fn holding(scene: &Scene, body: &str) -> Checked {
-    let free = held::free_motions(scene, body);
-    let touches = scene.contact.values().any(|pair| pair.slave.body == body || pair.master.body == body);
-    if free.is_empty() || touches {
+    if scene.body[body].brick().is_none() || scene.touches(body) {
         return Ok(());
     }
-    let rule = format!(
-        "nothing holds this body against {}: add supports, or a contact pair that can hold it",
-        held::listed(&free)
-    );
-    Err(whole(&format!("body.{body}"), rule))
+    Held::brick(scene, body).refusal().map_or(Ok(()), |rule| Err(whole(&format!("body.{body}"), rule)))
 }

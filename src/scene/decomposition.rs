@@ -4,10 +4,13 @@ use serde::{Deserialize, Serialize};
 
 /// The method and its one parameter.
 ///
-/// In a file the method may be left out: `subdomains` selects metis, anything else bricks.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// In a file the method may be left out: `subdomains` selects metis, `cells` bricks, and nothing auto.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "lowercase", try_from = "Section")]
 pub enum Decomposition {
+    /// Bricks with the paper's cells where they divide every body, else metis by the cost model.
+    #[default]
+    Auto,
     /// Equal boxes of cells; they must divide every brick.
     Bricks {
         /// Cells of one subdomain along each axis. Not refined by the level: the subdomains multiply instead.
@@ -15,17 +18,14 @@ pub enum Decomposition {
     },
     /// A graph partition of the elements.
     Metis {
-        /// How many parts to ask for over all bodies; parts that fall apart are split further.
-        subdomains: usize,
+        /// How many parts to ask for over all bodies; parts that fall apart are split further. Absent: by a cost model.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        subdomains: Option<usize>,
     },
 }
 
-impl Default for Decomposition {
-    /// The paper's cubes of 10 x 10 x 10 cells.
-    fn default() -> Self {
-        Decomposition::Bricks { cells: [10, 10, 10] }
-    }
-}
+/// The paper's cubes of 10 x 10 x 10 cells.
+pub const PAPER_CELLS: [usize; 3] = [10, 10, 10];
 
 /// The section as written.
 #[derive(Deserialize)]
@@ -36,35 +36,38 @@ struct Section {
     subdomains: Option<usize>,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Method {
+    Auto,
     Bricks,
     Metis,
 }
 
 /// Keys of the section that contradict each other.
 #[derive(Debug, thiserror::Error)]
-enum SectionError {
-    #[error(
-        "decomposition.subdomains = {0} belongs to method = \"metis\", but method = \"bricks\" is given: \
-         remove subdomains, or change or remove the method"
-    )]
-    SubdomainsOfBricks(usize),
-    #[error("decomposition.method = \"metis\" needs decomposition.subdomains, the number of parts to cut into")]
-    NoSubdomains,
+#[error(
+    "decomposition.subdomains = {subdomains} belongs to method = \"metis\", but method = \"{method}\" is given: \
+     remove subdomains, or change or remove the method"
+)]
+struct SectionError {
+    subdomains: usize,
+    method: &'static str,
 }
 
 impl TryFrom<Section> for Decomposition {
     type Error = SectionError;
 
-    /// `cells` beside metis are ignored: a file can keep them while its user tries the other method.
+    /// `cells` beside other methods are ignored: a file can keep them while its user tries these.
     fn try_from(section: Section) -> Result<Self, SectionError> {
-        match (section.method, section.subdomains) {
-            (Some(Method::Bricks), Some(subdomains)) => Err(SectionError::SubdomainsOfBricks(subdomains)),
-            (Some(Method::Metis), None) => Err(SectionError::NoSubdomains),
-            (_, Some(subdomains)) => Ok(Decomposition::Metis { subdomains }),
-            (_, None) => Ok(section.cells.map_or_else(Decomposition::default, |cells| Decomposition::Bricks { cells })),
+        let Section { method, cells, subdomains } = section;
+        match (method, subdomains) {
+            (Some(Method::Bricks), Some(subdomains)) => Err(SectionError { subdomains, method: "bricks" }),
+            (Some(Method::Auto), Some(subdomains)) => Err(SectionError { subdomains, method: "auto" }),
+            (Some(Method::Metis), _) | (None, Some(_)) => Ok(Decomposition::Metis { subdomains }),
+            (Some(Method::Auto), None) => Ok(Decomposition::Auto),
+            (Some(Method::Bricks), None) => Ok(Decomposition::Bricks { cells: cells.unwrap_or(PAPER_CELLS) }),
+            (None, None) => Ok(cells.map_or(Decomposition::Auto, |cells| Decomposition::Bricks { cells })),
         }
     }
 }

@@ -40,6 +40,17 @@ pub enum SceneError {
     /// Level 0 has no cells.
     #[error("level 0 leaves no cells: levels start at 1, and level n has n times the cells per edge")]
     Level,
+    /// Meshes from files are as fine as they are.
+    #[error(
+        "level {level} refines bricks only, and body {body} is from a mesh file: use level 1 and refine the mesh, as with \
+         `gmsh -refine` or `Mesh.MeshSizeFactor = 0.5;`"
+    )]
+    LevelOfMesh {
+        /// What was asked for.
+        level: usize,
+        /// A body from a mesh file.
+        body: String,
+    },
     /// Well-formed, but the values make no sense.
     #[error("{place}: {fault}")]
     Check {

@@ -1,11 +1,13 @@
 //! Whether the supports of a body remove all its rigid motions, and which ones they leave.
 //!
 //! A rigid motion displaces the point `x` by `t + w x x` (cross product), so a component fixed at `x` is one row of
-//! `[I, -skew(x)]` on `(t, w)`, and what is held is the rank of these rows over the corners of the supported faces: the
-//! corners span the linear functions on a face, so they stand for all its points. The rank is taken on the cube with
-//! corners (+-1, +-1, +-1) instead of the true brick: supports on whole faces give the same rank for all edge lengths
-//! (each reads "a rotation is zero" or "a translation equals an edge length times a rotation"), so nothing depends on
-//! how slender the body is.
+//! `[I, -skew(x)]` on `(t, w)`, and what is held is the rank of these rows over the supported points. They are taken from
+//! their centre and in units of their extent, so nothing depends on where or how large a body is.
+//!
+//! For a brick the corners of the supported faces do: they span the linear functions on a face, so they stand for all its
+//! points. The rank is taken on the cube with corners (+-1, +-1, +-1) instead of the true brick: supports on whole faces
+//! give the same rank for all edge lengths (each reads "a rotation is zero" or "a translation equals an edge length times
+//! a rotation"), so nothing depends on how slender the body is either.
 //!
 //! Contact is not looked at: it can hold a body, but only a solution tells.
 
@@ -17,7 +19,7 @@ use super::surface::{Face, Support};
 
 /// A rigid motion in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Motion {
+enum Motion {
     /// Along an axis.
     Translation(Axis),
     /// About some line parallel to an axis.
@@ -33,32 +35,69 @@ impl fmt::Display for Motion {
     }
 }
 
-/// The motions that the supports leave to a body: as many as 6 minus the rank.
-pub(super) fn free_motions(scene: &Scene, body: &str) -> Vec<Motion> {
-    let supports = scene.support.values().filter(|support| support.surface.body == body);
-    let pivots = pivot_columns(supports.flat_map(rows).collect());
-    let translations = Axis::ALL.into_iter().map(Motion::Translation);
-    let rotations = Axis::ALL.into_iter().map(Motion::Rotation);
-    // Translations come first, so a free column is a pure translation, or a rotation with the translation that moves
-    // its line to where the supports want it.
-    translations.chain(rotations).zip(pivots).filter(|(_, held)| !held).map(|(motion, _)| motion).collect()
+/// What the supports of a body leave free.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Held {
+    body: String,
+    free: Vec<Motion>,
 }
 
-/// What to tell the user of a body that only contact holds; nothing of a held body.
-pub(super) fn warning(body: &str, free: &[Motion]) -> Option<String> {
-    let motions = if free.len() == 1 { "rigid motion" } else { "rigid motions" };
-    (!free.is_empty()).then(|| {
-        format!("body {body}: its supports leave {} {motions} that only contact can hold: {}", free.len(), listed(free))
-    })
-}
+impl Held {
+    /// A brick, by its supported faces.
+    pub(super) fn brick(scene: &Scene, body: &str) -> Self {
+        let supports = scene.support.values().filter(|support| support.surface.body == body);
+        Self::new(body, supports.flat_map(rows).collect())
+    }
 
-/// Motions as a list in words.
-pub(super) fn listed(motions: &[Motion]) -> String {
-    motions.iter().map(Motion::to_string).collect::<Vec<_>>().join(", ")
+    /// Any body, by its supported points and the components that are fixed there.
+    pub fn at(body: &str, supported: &[([f64; 3], &[Axis])]) -> Self {
+        let count = supported.len() as f64;
+        let centre: [f64; 3] = [0, 1, 2].map(|a| supported.iter().map(|(x, _)| x[a] / count).sum());
+        let from_centre = |x: &[f64; 3]| [0, 1, 2].map(|a| x[a] - centre[a]);
+        let extent = supported.iter().flat_map(|(x, _)| from_centre(x)).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+        let rows = supported.iter().flat_map(|(x, fix)| {
+            let x = from_centre(x).map(|x| x / extent);
+            fix.iter().map(move |&axis| row(x, axis))
+        });
+        Self::new(body, rows.collect())
+    }
+
+    /// The free motions: as many as 6 minus the rank.
+    fn new(body: &str, rows: Vec<[f64; 6]>) -> Self {
+        let translations = Axis::ALL.into_iter().map(Motion::Translation);
+        let rotations = Axis::ALL.into_iter().map(Motion::Rotation);
+        // Translations come first, so a free column is a pure translation, or a rotation with the translation that moves
+        // its line to where the supports want it.
+        let motions = translations.chain(rotations).zip(pivot_columns(rows));
+        Self { body: body.to_owned(), free: motions.filter(|(_, held)| !held).map(|(motion, _)| motion).collect() }
+    }
+
+    /// What to tell the user of a body that only contact holds; nothing of a held body.
+    pub fn warning(&self) -> Option<String> {
+        let Self { body, free } = self;
+        let motions = if free.len() == 1 { "rigid motion" } else { "rigid motions" };
+        let listed = self.listed();
+        (!free.is_empty()).then(|| {
+            format!("body {body}: its supports leave {} {motions} that only contact can hold: {listed}", free.len())
+        })
+    }
+
+    /// What to tell the user of a body that cannot even be held by contact, because it has none; nothing of a held body.
+    pub fn refusal(&self) -> Option<String> {
+        let listed = self.listed();
+        (!self.free.is_empty()).then(|| {
+            format!("nothing holds this body against {listed}: add supports, or a contact pair that can hold it")
+        })
+    }
+
+    fn listed(&self) -> String {
+        self.free.iter().map(Motion::to_string).collect::<Vec<_>>().join(", ")
+    }
 }
 
 fn rows(support: &Support) -> Vec<[f64; 6]> {
-    corners(support.surface.face).flat_map(|x| support.fix.iter().map(move |&axis| row(x, axis))).collect()
+    let corners = support.surface.face().into_iter().flat_map(corners);
+    corners.flat_map(|x| support.fix.iter().map(move |&axis| row(x, axis))).collect()
 }
 
 fn corners(face: Face) -> impl Iterator<Item = [f64; 3]> {
@@ -78,11 +117,18 @@ fn row(x: [f64; 3], axis: Axis) -> [f64; 6] {
     row
 }
 
-/// Gaussian elimination; entries are small integers, so the threshold separates zero from at least about one.
+/// Shorter arms than this, in units of the extent, hold nothing.
+const SHORTEST_ARM: f64 = 1e-6;
+
+/// Gaussian elimination with pivoting among the rows.
 fn pivot_columns(mut rows: Vec<[f64; 6]>) -> [bool; 6] {
     let mut is_pivot = [false; 6];
     for column in 0..6 {
-        let Some(found) = rows.iter().position(|row| row[column].abs() > 1e-9) else { continue };
+        let size = |k: &usize| rows[*k][column].abs();
+        let Some(found) = (0..rows.len()).max_by(|a, b| size(a).total_cmp(&size(b))) else { break };
+        if size(&found) <= SHORTEST_ARM {
+            continue;
+        }
         let pivot = rows.swap_remove(found);
         is_pivot[column] = true;
         for row in &mut rows {
@@ -93,4 +139,34 @@ fn pivot_columns(mut rows: Vec<[f64; 6]>) -> [bool; 6] {
         }
     }
     is_pivot
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: &[Axis] = &Axis::ALL;
+
+    fn free(supported: &[([f64; 3], &[Axis])]) -> String {
+        Held::at("body", supported).listed()
+    }
+
+    #[test]
+    fn far_and_tiny_supports_hold_like_others() {
+        for (size, origin) in [(1.0, 0.0), (1e-3, 1e3), (1e6, -1e6)] {
+            let at = |x: f64, y: f64, z: f64| [origin + size * x, origin + size * y, origin + size * z];
+            let three = [at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0), at(0.3, 1.0, 0.0)];
+            assert_eq!(free(&three.map(|x| (x, ALL))), "");
+            assert_eq!(
+                free(&three.map(|x| (x, &ALL[2..]))),
+                "translation along x, translation along y, rotation about z"
+            );
+            let two = [(three[0], ALL), (three[1], ALL)];
+            assert_eq!(free(&two), "rotation about x");
+            assert_eq!(free(&two[..1]), "rotation about x, rotation about y, rotation about z");
+            // A sliding hinge about the line of the two points.
+            assert_eq!(free(&two.map(|(x, _)| (x, &ALL[1..]))), "translation along x, rotation about x");
+        }
+        assert_eq!(Held::at("body", &[]).free.len(), 6);
+    }
 }

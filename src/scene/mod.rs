@@ -19,13 +19,14 @@ mod solver;
 mod surface;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-pub use body::{Axis, Body, Brick, Element};
-pub use decomposition::Decomposition;
+pub use body::{Axis, Body, Brick, Element, Gmsh, Rotation, Shape};
+pub use decomposition::{Decomposition, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
+pub use held::Held;
 pub use material::Material;
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
 pub use surface::{Contact, Face, Load, Support, SurfaceError, SurfaceName};
@@ -54,6 +55,9 @@ pub struct Scene {
     pub decomposition: Decomposition,
     /// Methods, tolerances and limits.
     pub solver: Solver,
+    /// Where the scene comes from: relative paths of mesh files begin here.
+    #[serde(skip)]
+    pub directory: PathBuf,
 }
 
 impl Scene {
@@ -86,7 +90,8 @@ impl Scene {
         Ok((text, name_or_path.to_owned()))
     }
 
-    /// As [`Scene::load`] for TOML that is already in memory; `origin` names it in messages.
+    /// As [`Scene::load`] for TOML that is already in memory; `origin` names it in messages, and mesh files are sought
+    /// beside it.
     ///
     /// # Errors
     /// As [`Scene::load`], but for reading.
@@ -95,13 +100,26 @@ impl Scene {
             return Err(SceneError::Level);
         }
         let mut scene = read::scene(text, origin, sets)?;
-        for body in scene.body.values_mut() {
-            body.brick.refine(level);
+        scene.directory = Path::new(origin).parent().map(Path::to_path_buf).unwrap_or_default();
+        for (name, body) in &mut scene.body {
+            match &mut body.shape {
+                Shape::Brick(brick) => brick.refine(level),
+                Shape::Gmsh(_) if level > 1 => return Err(SceneError::LevelOfMesh { level, body: name.clone() }),
+                Shape::Gmsh(_) => {}
+            }
         }
+        scene.settle_surfaces();
         match check::scene(&scene) {
             Ok(()) => Ok(scene),
             Err(fault) => Err(SceneError::Check { place: read::place(text, origin, sets, &fault.key), fault }),
         }
+    }
+
+    fn settle_surfaces(&mut self) {
+        let supports = self.support.values_mut().map(|s| &mut s.surface);
+        let loads = self.load.values_mut().map(|l| &mut l.surface);
+        let contacts = self.contact.values_mut().flat_map(|c| [&mut c.slave, &mut c.master]);
+        supports.chain(loads).chain(contacts).for_each(|surface| surface.settle(self.body.keys()));
     }
 
     /// The effective scene as TOML: level and overrides included, defaults spelled out. Reads back (at level 1) to an
@@ -113,9 +131,23 @@ impl Scene {
         toml::to_string(self).expect("the counts of a checked scene fit TOML's integers")
     }
 
-    /// Sentences about what is legal but easily a mistake: bodies that only contact can hold.
+    /// Surfaces that supports, loads and contacts name, with repetitions.
+    pub fn surfaces(&self) -> impl Iterator<Item = &SurfaceName> {
+        let supports = self.support.values().map(|s| &s.surface);
+        let loads = self.load.values().map(|l| &l.surface);
+        supports.chain(loads).chain(self.contact.values().flat_map(|c| [&c.slave, &c.master]))
+    }
+
+    /// Whether a body takes part in a contact.
+    pub fn touches(&self, body: &str) -> bool {
+        self.contact.values().any(|pair| pair.slave.body == body || pair.master.body == body)
+    }
+
+    /// Sentences about what is legal but easily a mistake: bricks that only contact can hold. Bodies from mesh files are
+    /// looked at when their meshes are read.
     pub fn warnings(&self) -> Vec<String> {
-        self.body.keys().filter_map(|body| held::warning(body, &held::free_motions(self, body))).collect()
+        let bricks = self.body.iter().filter(|(_, body)| body.brick().is_some());
+        bricks.filter_map(|(name, _)| Held::brick(self, name).warning()).collect()
     }
 }
 

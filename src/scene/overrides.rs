@@ -87,12 +87,12 @@ fn parse_value(value: &str) -> Result<Value, String> {
 }
 
 /// Keys of the file that an override makes meaningless: `subdomains` alone selects metis whatever method the file has,
-/// and `method=bricks` alone drops the file's `subdomains`.
+/// and `method=bricks` or `method=auto` alone drops the file's `subdomains`.
 fn give_way(tree: &mut Table, changes: &[Override]) {
     let given = |key: &str| changes.iter().find(|change| change.path == ["decomposition", key]);
     let stale = match (given("method"), given("subdomains")) {
         (None, Some(_)) => "method",
-        (Some(method), None) if method.value.as_str() == Some("bricks") => "subdomains",
+        (Some(method), None) if matches!(method.value.as_str(), Some("bricks" | "auto")) => "subdomains",
         _ => return,
     };
     if let Some(Value::Table(section)) = tree.get_mut("decomposition") {

@@ -1,4 +1,4 @@
-//! Surfaces, addressed as `body.face`, and what happens on them: supports, loads, contact.
+//! Surfaces, addressed as `body.surface`, and what happens on them: supports, loads, contact.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,14 +7,30 @@ use serde::{Deserialize, Serialize};
 
 use super::body::Axis;
 
-/// A face of a body, written `body.face`.
+/// A surface of a body, written `body.surface`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct SurfaceName {
     /// Name of the body.
     pub body: String,
-    /// Which of its faces.
-    pub face: Face,
+    /// Which of its surfaces: a [`Face`] of a brick, a physical surface of a mesh file.
+    pub surface: String,
+}
+
+impl SurfaceName {
+    /// The face of this name, for surfaces of bricks.
+    pub fn face(&self) -> Option<Face> {
+        Face::ALL.into_iter().find(|face| face.name() == self.surface)
+    }
+
+    /// Splits the text anew where both parts may have dots: behind the longest name of a body that it begins with.
+    pub(super) fn settle<'a>(&mut self, bodies: impl Iterator<Item = &'a String>) {
+        let text = self.to_string();
+        let fits = |body: &&String| text.strip_prefix(body.as_str()).is_some_and(|rest| rest.starts_with('.'));
+        if let Some(body) = bodies.filter(fits).max_by_key(|body| body.len()) {
+            *self = Self { body: body.clone(), surface: text[body.len() + 1..].to_owned() };
+        }
+    }
 }
 
 /// The six faces of a brick.
@@ -56,38 +72,25 @@ impl Face {
 
 impl fmt::Display for SurfaceName {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}.{}", self.body, self.face.name())
+        write!(f, "{}.{}", self.body, self.surface)
     }
 }
 
-/// Why a text is not a surface; bodies are looked up later, when all are known.
+/// Why a text is not a surface; bodies and their surfaces are looked up later, when all are known.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SurfaceError {
-    /// The text has no dot, or nothing before it.
-    #[error("`{0}` is not a surface: write body.face, as in lower.zmax")]
-    NoBody(String),
-    /// A brick has no such face.
-    #[error("`{face}` is not a face of body `{body}`: a brick has xmin, xmax, ymin, ymax, zmin, zmax")]
-    NoFace {
-        /// The body as written.
-        body: String,
-        /// The face as written.
-        face: String,
-    },
-}
+#[error("`{0}` is not a surface: write body.surface, as in lower.zmax")]
+pub struct SurfaceError(String);
 
 impl FromStr for SurfaceName {
     type Err = SurfaceError;
 
-    /// Splits at the last dot, so that names of bodies may have dots themselves.
+    /// Splits at the last dot.
     fn from_str(text: &str) -> Result<Self, SurfaceError> {
-        let Some((body, face)) = text.rsplit_once('.').filter(|(body, _)| !body.is_empty()) else {
-            return Err(SurfaceError::NoBody(text.to_owned()));
-        };
-        let body = body.to_owned();
-        match Face::ALL.into_iter().find(|known| known.name() == face) {
-            Some(face) => Ok(SurfaceName { body, face }),
-            None => Err(SurfaceError::NoFace { body, face: face.to_owned() }),
+        match text.rsplit_once('.') {
+            Some((body, surface)) if !body.is_empty() && !surface.is_empty() => {
+                Ok(SurfaceName { body: body.to_owned(), surface: surface.to_owned() })
+            }
+            _ => Err(SurfaceError(text.to_owned())),
         }
     }
 }

@@ -67,14 +67,14 @@ fn two_blocks_is_the_benchmark() {
     let scene = two_blocks(&[]).unwrap();
     let upper = &scene.body["upper"];
     assert_eq!(
-        upper.brick,
+        *upper.brick().unwrap(),
         Brick { origin: [600.0, 0.0, 1000.0], size: [3000.0, 1000.0, 1000.0], cells: [30, 10, 10] }
     );
-    assert_eq!(scene.body.values().map(|body| body.brick.cell_count()).sum::<usize>(), 6000);
+    assert_eq!(scene.body.values().map(|body| body.brick().unwrap().cell_count()).sum::<usize>(), 6000);
     assert_eq!(scene.material["upper"], scene.material["lower"]);
     assert_eq!(scene.load["top"].traction, [0.0, 0.0, -150.0]);
     assert_eq!(scene.contact["joint"].slave.to_string(), "upper.zmin");
-    assert_eq!(scene.decomposition, Decomposition::Bricks { cells: [10, 10, 10] });
+    assert_eq!(scene.decomposition, Decomposition::Bricks { cells: PAPER_CELLS });
     assert_eq!(scene.solver, Solver::default());
 }
 
@@ -104,8 +104,8 @@ fn effective_scenes_round_trip() {
 #[test]
 fn levels_refine_cells_but_not_subdomains() {
     let scene = Scene::load("two-blocks", 3, &[]).unwrap();
-    assert_eq!(scene.body["lower"].brick.cells, [90, 30, 30]);
-    assert_eq!(scene.decomposition, Decomposition::Bricks { cells: [10, 10, 10] });
+    assert_eq!(scene.body["lower"].brick().unwrap().cells, [90, 30, 30]);
+    assert_eq!(scene.decomposition, Decomposition::Bricks { cells: PAPER_CELLS });
     assert_says(Scene::load("two-blocks", 0, &[]), &["level 0"]);
     assert_says(Scene::load("two-blocks", usize::MAX, &[]), &["body.lower.brick.cells", "too many"]);
 }
@@ -121,7 +121,8 @@ fn files_are_read() {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), ONE).unwrap();
     let scene = Scene::load(file.path().to_str().unwrap(), 1, &[]).unwrap();
-    assert_eq!(scene, one(&[]).unwrap());
+    let directory = file.path().parent().unwrap().to_path_buf();
+    assert_eq!(scene, Scene { directory, ..one(&[]).unwrap() });
 }
 
 #[test]
@@ -174,6 +175,50 @@ fn bodies_are_checked() {
 }
 
 #[test]
+fn bodies_from_mesh_files_are_checked() {
+    let gmsh = |rest: &str| {
+        let text = ONE.replace("brick = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }", rest);
+        let text = text.replace("[decomposition]\ncells = [2, 2, 2]\n", "").replace("block.zmin", "block.the bottom");
+        Scene::from_text(&text, "dir/one.toml", 1, &[])
+    };
+    let scene = gmsh("gmsh = { file = 'part.msh' }").unwrap();
+    let plain = Gmsh { file: "part.msh".into(), volume: None, scale: 1.0, rotate: None, translate: [0.0; 3] };
+    assert_eq!((scene.body["block"].gmsh(), scene.directory.to_str()), (Some(&plain), Some("dir")));
+    assert_eq!(scene.support["base"].surface.surface, "the bottom");
+    let all = "gmsh = { file = 'p.msh', volume = 'a b', scale = 1e3, rotate = { axis = [0, 0, 1], angle_deg = -30 }, \
+               translate = [1, 2, 3] }";
+    let scene = gmsh(all).unwrap();
+    assert_eq!(Scene::from_text(&scene.to_toml(), "dir/again.toml", 1, &[]).unwrap(), scene);
+
+    let refused = |rest: &str, parts: &[&str]| assert_says(gmsh(rest), parts);
+    refused("", &["line 6", "needs a shape", "brick = {", "gmsh = {"]);
+    refused("brick = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }\ngmsh = { file = 'a' }", &["both"]);
+    refused("gmsh = { volume = 'a' }", &["line 9", "missing key `file`"]);
+    refused("gmsh = { file = 'a', turn = 3 }", &["line 9", "unknown key `turn`", "rotate"]);
+    refused("gmsh = { file = '' }", &["body.block.gmsh.file"]);
+    refused("gmsh = { file = 'a', scale = 0 }", &["body.block.gmsh.scale = 0.0", "positive"]);
+    refused("gmsh = { file = 'a', translate = [0, nan, 0] }", &["body.block.gmsh.translate", "finite"]);
+    let turned =
+        |axis: &str, angle: &str| format!("gmsh = {{ file = 'a', rotate = {{ axis = {axis}, angle_deg = {angle} }} }}");
+    refused(&turned("[0, 0, 0]", "3"), &["body.block.gmsh.rotate.axis", "not all zero"]);
+    refused(&turned("[0, 0, 1]", "inf"), &["body.block.gmsh.rotate.angle_deg", "finite"]);
+    refused("gmsh = { file = 'a' }\n[decomposition]\ncells = [1, 1, 1]", &["body block is from a mesh file", "metis"]);
+    let text = scene.to_toml();
+    assert_says(Scene::from_text(&text, "one.toml", 2, &[]), &["level 2", "body block", "gmsh -refine"]);
+}
+
+#[test]
+fn names_of_bodies_and_surfaces_may_have_dots() {
+    let text = ONE.replace("body.block", "body.'a.b'").replace("block.zmin", "a.b.zmin");
+    let surface = |text: &str| Scene::from_text(text, "one.toml", 1, &[]).unwrap().support["base"].surface.clone();
+    assert_eq!(surface(&text), SurfaceName { body: "a.b".into(), surface: "zmin".into() });
+    let brick = "brick = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }";
+    let text =
+        text.replace(brick, "gmsh = { file = 'a' }").replace("a.b.zmin", "a.b.c.d.e").replace("cells = [2, 2, 2]", "");
+    assert_eq!(surface(&text), SurfaceName { body: "a.b".into(), surface: "c.d.e".into() });
+}
+
+#[test]
 fn surfaces_are_checked() {
     refuses(&["support.base.surface=blok.zmin"], &["support.base.surface = \"blok.zmin\"", "known are block"]);
     refuses_text(
@@ -181,10 +226,10 @@ fn surfaces_are_checked() {
         "block.bottom",
         &["line 11", "`bottom`", "`block`", "xmin, xmax, ymin, ymax, zmin, zmax"],
     );
-    refuses_text("block.zmin", "block", &["line 11", "`block` is not a surface", "body.face"]);
+    refuses_text("block.zmin", "block", &["line 11", "`block` is not a surface", "body.surface"]);
     refuses_text("block.zmin", ".zmin", &["line 11", "is not a surface"]);
     let surface: SurfaceName = "part.v2.ymax".parse().unwrap();
-    assert_eq!((surface.body.as_str(), surface.face), ("part.v2", Face::Ymax));
+    assert_eq!((surface.body.as_str(), surface.face()), ("part.v2", Some(Face::Ymax)));
 }
 
 #[test]
@@ -245,7 +290,8 @@ fn decompositions_are_checked() {
 
 #[test]
 fn the_method_follows_the_keys() {
-    let metis = |subdomains| Decomposition::Metis { subdomains };
+    let metis = |subdomains| Decomposition::Metis { subdomains: Some(subdomains) };
+    let bricks = Decomposition::Bricks { cells: PAPER_CELLS };
     let cut = |text: &str, list: &[&str]| {
         let text = ONE.replace("cells = [2, 2, 2]\n", text);
         Scene::from_text(&text, "one.toml", 5, &sets(list)).map(|scene| scene.decomposition)
@@ -255,11 +301,14 @@ fn the_method_follows_the_keys() {
     assert_eq!(cut("method = 'metis'\ncells = [9, 9, 9]\nsubdomains = 4", &[]).unwrap(), metis(4));
     let both = cut("method = 'bricks'\nsubdomains = 4", &[]).unwrap_err().to_string();
     assert!(both.contains("line 13") && both.contains("method = \"bricks\" is given"), "{both}");
-    let none = cut("method = 'metis'", &[]).unwrap_err().to_string();
-    assert!(none.contains("needs decomposition.subdomains"), "{none}");
+    assert_eq!(cut("method = 'metis'", &[]).unwrap(), Decomposition::Metis { subdomains: None });
+    assert_eq!(cut("method = 'bricks'", &[]).unwrap(), bricks);
+    assert_eq!(cut("method = 'auto'", &[]).unwrap(), Decomposition::Auto);
+    assert!(cut("method = 'auto'\nsubdomains = 4", &[]).is_err());
 
     assert_eq!(cut("method = 'bricks'", &["decomposition.subdomains=4"]).unwrap(), metis(4));
-    assert_eq!(cut("subdomains = 4", &["decomposition.method=bricks"]).unwrap(), Decomposition::default());
+    assert_eq!(cut("subdomains = 4", &["decomposition.method=bricks"]).unwrap(), bricks);
+    assert_eq!(cut("subdomains = 4", &["decomposition.method=auto"]).unwrap(), Decomposition::Auto);
     assert!(cut("", &["decomposition.method=bricks", "decomposition.subdomains=4"]).is_err());
     let supplied = ["decomposition.subdomains=4", "decomposition.method=metis"];
     assert_eq!(cut("method = 'bricks'", &supplied).unwrap(), metis(4));
@@ -329,9 +378,9 @@ fn overrides_reach_every_kind_of_value() {
     let scene = one(&changes).unwrap();
     assert_eq!((scene.title.as_str(), scene.units.as_str()), ("two words", "m, N, Pa"));
     assert_eq!(scene.material["steel"].hardening, 5.0);
-    let Brick { origin, size, .. } = scene.body["block"].brick;
+    let Brick { origin, size, .. } = *scene.body["block"].brick().unwrap();
     assert_eq!((origin, size), ([1.0, 2.0, 3.0], [1.0, 1.0, 0.5]));
-    assert_eq!(scene.support["base"].surface.face, Face::Xmin);
+    assert_eq!(scene.support["base"].surface.face(), Some(Face::Xmin));
     assert_eq!(scene.load["on top"].traction, [0.0, 0.0, 1.0]);
 }
 

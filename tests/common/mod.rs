@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "every test binary compiles this module and uses part of it")]
 
 pub mod fields;
+pub mod msh;
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};

@@ -1,0 +1,183 @@
+//! From the bodies of a scene to their meshes: bricks by formula, volumes of mesh files read by rank 0.
+//!
+//! A file that several bodies name is read once. What rank 0 finds wrong is everybody's error.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::comm::Comm;
+use crate::decomposition::{BodyMesh, Counts, Shape, number_bodies};
+use crate::mesh::gmsh::{Msh, Problem};
+use crate::mesh::placement::Placement;
+use crate::mesh::quality::Quality;
+use crate::mesh::{Brick, TetMesh};
+use crate::results::agree::root_texts;
+use crate::scene::{self, Axis, Decomposition, Gmsh, Held, Scene};
+
+/// Why there are no meshes; the same on every rank.
+#[derive(Debug, Error)]
+pub enum MeshError {
+    /// A mesh or what the scene wants of it is bad.
+    #[error("{0}")]
+    Bad(String),
+    /// A mesh file cannot be read.
+    #[error("{0}")]
+    Unreadable(String),
+}
+
+/// The meshes of all bodies.
+#[derive(Default)]
+pub struct Meshes {
+    /// In the order of the bodies' names.
+    pub bodies: Vec<BodyMesh>,
+    /// On rank 0 the meshes from files, by body; empty elsewhere.
+    pub tets: BTreeMap<usize, TetMesh>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Meshes {
+    /// Reads mesh files and counts. Collective.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or is not what the scene wants.
+    pub fn new(scene: &Scene, comm: &dyn Comm) -> Result<Self, MeshError> {
+        let found = if comm.rank() == 0 { read(scene) } else { Ok(Found::default()) };
+        let texts = match &found {
+            Ok(Found { warnings, .. }) => root_texts(comm, ["", ""].into_iter().chain(warnings.iter().map(|w| &w[..]))),
+            Err(MeshError::Bad(text)) => root_texts(comm, ["bad", text]),
+            Err(MeshError::Unreadable(text)) => root_texts(comm, ["unreadable", text]),
+        };
+        match &texts[0][..] {
+            "bad" => return Err(MeshError::Bad(texts[1].clone())),
+            "unreadable" => return Err(MeshError::Unreadable(texts[1].clone())),
+            _ => {}
+        }
+        let tets = found?.tets;
+        let mine = tets.values().flat_map(|m| [m.points.len() as u64, m.cells, m.tets.len() as u64]).collect();
+        let outgoing = if comm.rank() == 0 { vec![mine; comm.size()] } else { vec![Vec::new(); comm.size()] };
+        let mut counts = comm.all_to_all(outgoing).swap_remove(0).into_iter();
+        let shape = |body: &scene::Body| match &body.shape {
+            scene::Shape::Brick(b) => brick(b),
+            scene::Shape::Gmsh(_) => {
+                let [nodes, cells, elements] = [(); 3].map(|()| counts.next().expect("every mesh is counted"));
+                Shape::Tets(Counts { nodes, cells, elements })
+            }
+        };
+        let bodies = number_bodies(scene.body.values().map(shape).collect());
+        Ok(Self { bodies, tets, warnings: texts[2..].to_vec() })
+    }
+}
+
+/// The bodies of a scene of bricks alone.
+pub fn bricks(scene: &Scene) -> Option<Vec<BodyMesh>> {
+    scene.body.values().map(|body| body.brick().map(brick)).collect::<Option<_>>().map(number_bodies)
+}
+
+fn brick(b: &scene::Brick) -> Shape {
+    Shape::Brick(Brick { origin: b.origin, size: b.size, cells: b.cells })
+}
+
+/// What rank 0 reads.
+#[derive(Default)]
+struct Found {
+    tets: BTreeMap<usize, TetMesh>,
+    warnings: Vec<String>,
+}
+
+/// A body from a mesh file.
+struct FromFile<'a> {
+    index: usize,
+    name: &'a String,
+    gmsh: &'a Gmsh,
+}
+
+fn read(scene: &Scene) -> Result<Found, MeshError> {
+    let mut files: BTreeMap<PathBuf, Vec<FromFile>> = BTreeMap::new();
+    for (index, (name, body)) in scene.body.iter().enumerate() {
+        if let Some(gmsh) = body.gmsh() {
+            files.entry(scene.directory.join(&gmsh.file)).or_default().push(FromFile { index, name, gmsh });
+        }
+    }
+    let mut found = Found::default();
+    for (path, bodies) in &files {
+        let msh = Msh::read(path).map_err(|problem| {
+            let text = format!("{}: {problem}", path.display());
+            if matches!(problem, Problem::Read(_)) { MeshError::Unreadable(text) } else { MeshError::Bad(text) }
+        })?;
+        for FromFile { index, name, gmsh } in bodies {
+            let surfaces: Vec<&str> = surfaces_of(scene, name).into_iter().collect();
+            let problem = |problem: Problem| MeshError::Bad(format!("body.{name}: {}: {problem}", path.display()));
+            let mut mesh = msh.volume(gmsh.volume.as_deref(), &surfaces).map_err(problem)?;
+            place(gmsh, &mut mesh);
+            found.warnings.extend(check(scene, name, &mesh)?);
+            found.tets.insert(*index, mesh);
+        }
+        let used: BTreeSet<_> = bodies.iter().map(|b| b.gmsh.volume.clone()).collect();
+        let unused: Vec<_> =
+            msh.volume_names().into_iter().filter(|name| !used.contains(&Some(name.clone()))).collect();
+        if !used.contains(&None) && !unused.is_empty() {
+            found.warnings.push(format!("{}: no body is made of volume {}", path.display(), unused.join(", ")));
+        }
+    }
+    count(scene, &found)?;
+    Ok(found)
+}
+
+/// Names of a body's surfaces that the scene uses.
+fn surfaces_of<'a>(scene: &'a Scene, body: &str) -> BTreeSet<&'a str> {
+    scene.surfaces().filter(|surface| surface.body == body).map(|surface| &surface.surface[..]).collect()
+}
+
+fn place(gmsh: &Gmsh, mesh: &mut TetMesh) {
+    let rotation = gmsh.rotate.map(|r| (r.axis, r.angle_deg));
+    Placement { scale: gmsh.scale, rotation, translation: gmsh.translate }.apply(&mut mesh.points);
+}
+
+/// Elements of worse shape are worth a word.
+const POOR_SHAPE: f64 = 0.01;
+
+/// Looks at one body; returns warnings.
+fn check(scene: &Scene, body: &str, mesh: &TetMesh) -> Result<Vec<String>, MeshError> {
+    let quality = Quality::of(mesh.tets.iter().map(|&tet| mesh.corners(tet)));
+    if !quality.is_sound() {
+        // Sound in the file: the coordinates of the scene have lost its digits.
+        let rule = "gmsh.scale and gmsh.translate leave elements without volume";
+        return Err(MeshError::Bad(format!("body.{body}: {rule}")));
+    }
+    let mut warnings = Vec::new();
+    if quality.worst_shape < POOR_SHAPE {
+        warnings.push(format!(
+            "body {body}: its flattest element has {:.1e} of the shape of a regular one, which costs accuracy; try \
+             `Mesh.OptimizeNetgen = 1;`",
+            quality.worst_shape
+        ));
+    }
+    let mut supported: Vec<([f64; 3], &[Axis])> = Vec::new();
+    for support in scene.support.values().filter(|s| s.surface.body == body) {
+        let nodes: BTreeSet<u32> = mesh.surface(&support.surface.surface).iter().flatten().copied().collect();
+        supported.extend(nodes.into_iter().map(|n| (mesh.points[n as usize], &support.fix[..])));
+    }
+    let held = Held::at(body, &supported);
+    match held.refusal().filter(|_| !scene.touches(body)) {
+        Some(rule) => Err(MeshError::Bad(format!("body.{body}: {rule}"))),
+        None => {
+            warnings.extend(held.warning());
+            Ok(warnings)
+        }
+    }
+}
+
+/// Refuses more subdomains than elements; of bricks alone the scene's own checks do.
+fn count(scene: &Scene, found: &Found) -> Result<(), MeshError> {
+    let Decomposition::Metis { subdomains: Some(subdomains) } = scene.decomposition else { return Ok(()) };
+    let bricks = scene.body.values().filter_map(|b| Some(b.brick()?.cell_count() * b.element.per_cell()));
+    let elements = found.tets.values().map(|mesh| mesh.tets.len()).chain(bricks).fold(0_usize, usize::saturating_add);
+    if subdomains <= elements {
+        return Ok(());
+    }
+    let rule = format!("there are only {elements} elements to share out");
+    Err(MeshError::Bad(format!("decomposition.subdomains = {subdomains}: {rule}")))
+}
