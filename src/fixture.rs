@@ -67,6 +67,33 @@ pub fn two_bricks_by_metis(parts: usize) -> Scene {
     two_bricks(&[&format!("decomposition.subdomains={parts}")])
 }
 
+/// Two blocks of hexahedra and prisms from a mesh file, one over the other, cut by METIS into about so many parts.
+pub fn two_meshes(parts: usize) -> Scene {
+    const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/meshes/hexes-and-prisms.msh");
+    let text = format!(
+        r#"
+        material.steel = {{ young = 210.0, poisson = 0.3 }}
+        [body.lower]
+        material = "steel"
+        element = "tet4"
+        gmsh = {{ file = "{FILE}", volume = "block" }}
+        [body.upper]
+        material = "steel"
+        element = "tet4"
+        gmsh = {{ file = "{FILE}", translate = [0.0, 0.0, 1.25] }}
+        [support]
+        low = {{ surface = "lower.base", fix = ["x", "y", "z"] }}
+        high = {{ surface = "upper.top", fix = ["x", "y", "z"], displacement = [0.0, 0.0, -0.3] }}
+        [contact.joint]
+        slave = "upper.base"
+        master = "lower.top"
+        [decomposition]
+        subdomains = {parts}
+        "#
+    );
+    Scene::from_text(&text, "two meshes", 1, &[]).expect("the scene is sound")
+}
+
 /// A built-in scene; `patch` has nodes with eight copies.
 pub fn built_in(name: &str, sets: &[&str]) -> Scene {
     Scene::load(name, 1, &owned(sets)).expect("the scene is sound")

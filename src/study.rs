@@ -167,7 +167,7 @@ fn cut(wanted: &scene::Decomposition, bodies: &[BodyMesh]) -> Cut {
         scene::Decomposition::Auto if bodies.iter().all(divides) => Cut::Bricks(scene::PAPER_CELLS),
         scene::Decomposition::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
         scene::Decomposition::Metis { subdomains: None } | scene::Decomposition::Auto => {
-            Cut::Metis(cost::subdomains(&bodies.iter().map(|b| b.counts().elements).collect::<Vec<_>>()))
+            Cut::Metis(cost::subdomains(bodies.iter().map(|b| b.counts().elements).sum(), bodies.len()))
         }
     }
 }

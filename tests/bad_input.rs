@@ -5,45 +5,11 @@ mod common;
 
 use std::fs;
 
-use common::{Run, run, scene_file};
+use common::{EARLIER, assert_refused, assert_scene_refused, run, scene_file};
 
 const USAGE: i32 = 64;
 const BAD_SCENE: i32 = 65;
 const INPUT_OUTPUT: i32 = 74;
-
-const EARLIER: &str = "earlier results";
-
-/// Fails unless the program says one thing, once, without a backtrace, that has all the parts.
-#[track_caller]
-fn assert_refused(run: &Run, code: i32, parts: &[&str]) {
-    let said = &run.stderr;
-    assert_eq!(run.code, code, "{said}");
-    let messages = said.lines().filter(|line| line.starts_with("fetiplast:") || line.starts_with("error:")).count();
-    assert_eq!(messages, 1, "{said}");
-    for part in parts {
-        assert!(said.contains(part), "nothing about `{part}` in: {said}");
-    }
-    for word in ["panicked", "backtrace", "Caused by"] {
-        assert!(!said.contains(word), "{said}");
-    }
-}
-
-/// Solves with these overrides, on 1 and 2 ranks, where results of that name exist already.
-#[track_caller]
-fn assert_scene_refused(scene: &str, sets: &[&str], code: i32, parts: &[&str]) {
-    for ranks in [1, 2] {
-        let out = tempfile::tempdir().unwrap();
-        let (result, summary) = (out.path().join("patch.vtkhdf"), out.path().join("patch.json"));
-        fs::write(&result, EARLIER).unwrap();
-        fs::write(&summary, EARLIER).unwrap();
-        let mut arguments = vec!["solve", scene, "--out", out.path().to_str().unwrap()];
-        arguments.extend(sets.iter().flat_map(|set| ["--set", set]));
-        assert_refused(&run(ranks, &arguments), code, parts);
-        assert_eq!(fs::read_to_string(&result).unwrap(), EARLIER);
-        assert_eq!(fs::read_to_string(&summary).unwrap(), EARLIER);
-        assert_eq!(fs::read_dir(out.path()).unwrap().count(), 2, "no other files appear");
-    }
-}
 
 #[track_caller]
 fn assert_override_refused(set: &str, parts: &[&str]) {

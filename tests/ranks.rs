@@ -4,7 +4,9 @@
 mod common;
 
 use common::fields::Fields;
-use common::{Run, solve};
+use common::msh::{Form, write};
+use common::{Run, scene_file, solve};
+use fetiplast::mesh::Brick;
 use serde_json::{Map, Value};
 
 const RANKS: [usize; 4] = [1, 2, 3, 5];
@@ -68,6 +70,28 @@ fn bricks_give_the_same_bits_on_1_2_3_and_5_ranks() {
 fn metis_parts_give_the_same_bits_on_1_2_3_and_5_ranks() {
     let sets = [&COARSE[..2], &["decomposition.method=metis", "decomposition.subdomains=7"]].concat();
     assert!(assert_independent_of_ranks("two-blocks", &sets, &RANKS) >= 7);
+}
+
+#[test]
+fn bodies_from_mesh_files_give_the_same_bits_on_1_2_3_and_5_ranks() {
+    let brick = |z: f64| Brick { origin: [0.0, 0.0, z], size: [4.0, 2.0, 2.0], cells: [8, 4, 4] };
+    let directory = tempfile::tempdir().unwrap();
+    let mesh = write(&[("lower", brick(0.0)), ("upper", brick(2.0))], Form::Binary41);
+    std::fs::write(directory.path().join("two.msh"), mesh).unwrap();
+    let body = |name: &str| {
+        format!(
+            "[body.{name}]\nmaterial = 'steel'\nelement = 'tet4'\ngmsh = {{ file = 'two.msh', volume = '{name}' }}\n"
+        )
+    };
+    let text = "[material.steel]\nyoung = 210.0\npoisson = 0.3\nyield_stress = 0.3\nhardening = 10.0\n".to_owned()
+        + &body("lower")
+        + &body("upper")
+        + "[support.left]\nsurface = 'lower.xmin'\nfix = ['x', 'y', 'z']\n\
+           [support.right]\nsurface = 'upper.xmax'\nfix = ['x', 'y', 'z']\n\
+           [load.top]\nsurface = 'upper.zmax'\ntraction = [0.0, 0.0, -0.05]\n\
+           [contact.joint]\nslave = 'upper.zmin'\nmaster = 'lower.zmax'\n";
+    let scene = scene_file(directory.path(), &text);
+    assert!(assert_independent_of_ranks(&scene, &["decomposition.subdomains=7"], &RANKS) >= 7);
 }
 
 #[test]

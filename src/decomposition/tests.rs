@@ -1,8 +1,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Facet, Patch, Subdomain};
+use super::{Bodies, Counts, Cut, Facet, Patch, Shape, Subdomain, Surface, number_bodies, tear};
+use crate::comm::solo::Solo;
 use crate::comm::threads;
-use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis};
+use crate::element::Tet4;
+use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis, two_meshes};
+use crate::mesh::brick::indices;
+use crate::mesh::surface::area_vector;
+use crate::mesh::{Brick, Face, TetMesh};
 use crate::scene::Scene;
 use crate::study::{discretise, sizes};
 
@@ -45,23 +50,24 @@ fn sizes_are_those_of_the_papers_table_2() {
 
 #[test]
 fn every_subdomain_hangs_together_by_whole_faces() {
-    for scene in scenes() {
-        on_ranks(&scene, 1, |setup| {
-            for subdomain in setup.subdomains() {
-                let mut reached = BTreeSet::from([0]);
-                let mut front = vec![0];
-                while let Some(element) = front.pop() {
-                    for (other, nodes) in subdomain.elements.iter().enumerate() {
-                        let shared = nodes.iter().filter(|n| subdomain.elements[element].contains(n)).count();
-                        if shared == 3 && reached.insert(other) {
-                            front.push(other);
-                        }
-                    }
-                }
-                assert_eq!(reached.len(), subdomain.elements.len(), "{:?}", scene.decomposition);
-            }
-        });
+    for scene in scenes().into_iter().chain([two_meshes(2), two_meshes(24)]) {
+        on_ranks(&scene, 1, |setup| setup.subdomains().iter().for_each(assert_hangs_together));
     }
+}
+
+#[track_caller]
+fn assert_hangs_together(subdomain: &Subdomain) {
+    let mut reached = BTreeSet::from([0]);
+    let mut front = vec![0];
+    while let Some(element) = front.pop() {
+        for (other, nodes) in subdomain.elements.iter().enumerate() {
+            let shared = nodes.iter().filter(|n| subdomain.elements[element].contains(n)).count();
+            if shared == 3 && reached.insert(other) {
+                front.push(other);
+            }
+        }
+    }
+    assert_eq!(reached.len(), subdomain.elements.len());
 }
 
 #[test]
@@ -91,7 +97,7 @@ fn subdomains_are_the_same_on_any_number_of_ranks_and_idle_ranks_do_no_harm() {
     let plain = |s: &Subdomain| -> Plain {
         (s.id, s.body, s.nodes.clone(), s.elements.clone(), s.facets.clone(), s.boundary.clone())
     };
-    for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(7), two_meshes(7)] {
         let torn =
             |ranks| on_ranks(&scene, ranks, |setup| setup.subdomains().iter().map(plain).collect::<Vec<_>>()).concat();
         let alone = torn(1);
@@ -141,4 +147,93 @@ fn surfaces_of_nodes(setup: &Setup) -> BTreeMap<u64, Vec<u32>> {
         }
     }
     result
+}
+
+#[test]
+fn subdomains_of_meshes_fill_their_bodies_and_have_their_surfaces() {
+    for (parts, ranks) in [(2, 1), (7, 3), (24, 5)] {
+        let scene = two_meshes(parts);
+        let found = on_ranks(&scene, ranks, |setup| {
+            let surfaces = setup.discrete.surfaces.clone();
+            let (mut volume, mut area) = ([0.0; 2], BTreeMap::new());
+            for subdomain in setup.subdomains() {
+                let at = |nodes: &[u32]| -> Vec<_> { nodes.iter().map(|&n| subdomain.points[n as usize]).collect() };
+                for tet in &subdomain.elements {
+                    let tet = Tet4::new(&at(tet).try_into().unwrap()).expect("elements have volume");
+                    volume[subdomain.body] += tet.volume;
+                }
+                for facet in &subdomain.facets {
+                    let [.., up] = area_vector(&at(&facet.nodes).try_into().unwrap());
+                    *area.entry(facet.surface).or_insert(0.0) += up;
+                }
+            }
+            (surfaces, volume, area)
+        });
+        let sum =
+            |of: &dyn Fn(&(Vec<Surface>, [f64; 2], BTreeMap<usize, f64>)) -> f64| found.iter().map(of).sum::<f64>();
+        for body in 0..2 {
+            assert!((sum(&|f| f.1[body]) - 2.0).abs() < 1e-13);
+        }
+        for (index, surface) in found[0].0.iter().enumerate() {
+            let up = if surface.patch == Patch::Named("top".into()) { 2.0 } else { -2.0 };
+            assert!((sum(&|f| f.2.get(&index).copied().unwrap_or_default()) - up).abs() < 1e-13, "{surface:?}");
+        }
+        assert_eq!(found[0].0.len(), 4);
+    }
+}
+
+#[test]
+fn subdomains_survive_sending() {
+    for scene in [two_bricks_by_metis(5), two_meshes(5)] {
+        on_ranks(&scene, 1, |setup| {
+            let mut message = Vec::new();
+            setup.subdomains().iter().for_each(|s| s.pack(&mut message));
+            let mut message = message.into_iter();
+            let unpacked: Vec<_> = std::iter::from_fn(|| Subdomain::unpack(&mut message)).collect();
+            assert!(unpacked == setup.subdomains());
+        });
+    }
+}
+
+fn mesh_of(bricks: &[Brick]) -> TetMesh {
+    let mut mesh = TetMesh::default();
+    for brick in bricks {
+        let first = mesh.points.len() as u32;
+        mesh.points.extend(indices(&brick.all_nodes()).map(|at| brick.coordinates(at)));
+        let tets = indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell));
+        mesh.tets.extend(tets.map(|tet| tet.map(|n| first + n as u32)));
+    }
+    mesh
+}
+
+#[test]
+fn a_body_of_several_pieces_is_cut_piece_by_piece() {
+    let brick = |x: f64, cells| Brick { origin: [x, 0.0, 0.0], size: [1.0; 3], cells };
+    let mesh = mesh_of(&[brick(0.0, [4, 4, 4]), brick(2.0, [1, 1, 1]), brick(4.0, [4, 4, 2])]);
+    let elements = mesh.tets.len();
+    let counts = Counts { nodes: mesh.points.len() as u64, cells: 0, elements: elements as u64 };
+    let bodies = number_bodies(vec![Shape::Tets(counts)]);
+    let meshes = BTreeMap::from([(0, mesh)]);
+    for parts in [1, 3, 12] {
+        let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[], contact: &[] };
+        let subdomains = tear(&torn, Cut::Metis(parts), &Solo).subdomains;
+        assert!(subdomains.len() >= parts.max(3));
+        assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
+        subdomains.iter().for_each(assert_hangs_together);
+    }
+}
+
+#[test]
+fn contact_surfaces_stay_on_fewer_subdomains() {
+    let brick = Brick { origin: [0.0; 3], size: [3.0, 1.0, 1.0], cells: [24, 8, 8] };
+    let bodies = number_bodies(vec![Shape::Brick(brick)]);
+    let surfaces = [Surface { body: 0, patch: Patch::Face(Face::ZMax) }];
+    let touching = |contact: &[usize]| {
+        let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &surfaces, contact };
+        let subdomains = tear(&torn, Cut::Metis(24), &Solo).subdomains;
+        let largest = subdomains.iter().map(|s| s.elements.len()).max().unwrap();
+        assert!(largest * 24 <= brick.element_count() as usize * 11 / 10, "balance holds");
+        subdomains.iter().filter(|s| !s.facets.is_empty()).count()
+    };
+    assert!(touching(&[0]) < touching(&[]), "{} instead of {}", touching(&[0]), touching(&[]));
 }

@@ -9,15 +9,23 @@ pub struct TetMesh {
     pub tets: Vec<[u32; 4]>,
     /// Cells before they were split into elements.
     pub cells: u64,
-    /// Triangles on the boundary by the name of their surface, counter-clockwise from outside. A triangle may be on
-    /// several surfaces.
-    pub surfaces: Vec<(String, Vec<[u32; 3]>)>,
+    /// Parts of the boundary; a triangle may be on several.
+    pub surfaces: Vec<NamedSurface>,
+}
+
+/// Part of the boundary of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedSurface {
+    /// Its name.
+    pub name: String,
+    /// Its triangles, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 impl TetMesh {
     /// Triangles of a named surface; none if there is no such surface.
     pub fn surface(&self, name: &str) -> &[[u32; 3]] {
-        self.surfaces.iter().find(|(known, _)| known == name).map_or(&[], |(_, triangles)| triangles)
+        self.surfaces.iter().find(|surface| surface.name == name).map_or(&[], |surface| &surface.triangles)
     }
 
     /// Corners of an element.

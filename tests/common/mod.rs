@@ -186,3 +186,39 @@ pub fn assert_residuals(summary: &Value, bound: f64) {
         assert!(residual <= bound, "{key} is {residual:.2e}");
     }
 }
+
+/// What stands in files that a refused run must not touch.
+pub const EARLIER: &str = "earlier results";
+
+/// Fails unless the program says one thing, once, without a backtrace, that has all the parts.
+#[track_caller]
+pub fn assert_refused(run: &Run, code: i32, parts: &[&str]) {
+    let said = &run.stderr;
+    assert_eq!(run.code, code, "{said}");
+    let messages = said.lines().filter(|line| line.starts_with("fetiplast:") || line.starts_with("error:")).count();
+    assert_eq!(messages, 1, "{said}");
+    for part in parts {
+        assert!(said.contains(part), "nothing about `{part}` in: {said}");
+    }
+    for word in ["panicked", "backtrace", "Caused by"] {
+        assert!(!said.contains(word), "{said}");
+    }
+}
+
+/// Solves with these overrides, on 1 and 2 ranks, where results of that name exist already.
+#[track_caller]
+pub fn assert_scene_refused(scene: &str, sets: &[&str], code: i32, parts: &[&str]) {
+    let name = Path::new(scene).file_stem().unwrap().to_str().unwrap();
+    for ranks in [1, 2] {
+        let out = tempfile::tempdir().unwrap();
+        let (result, summary) = (out.path().join(format!("{name}.vtkhdf")), out.path().join(format!("{name}.json")));
+        fs::write(&result, EARLIER).unwrap();
+        fs::write(&summary, EARLIER).unwrap();
+        let mut arguments = vec!["solve", scene, "--out", out.path().to_str().unwrap()];
+        arguments.extend(sets.iter().flat_map(|set| ["--set", set]));
+        assert_refused(&run(ranks, &arguments), code, parts);
+        assert_eq!(fs::read_to_string(&result).unwrap(), EARLIER);
+        assert_eq!(fs::read_to_string(&summary).unwrap(), EARLIER);
+        assert_eq!(fs::read_dir(out.path()).unwrap().count(), 2, "no other files appear");
+    }
+}

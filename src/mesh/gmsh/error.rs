@@ -42,6 +42,14 @@ pub enum Problem {
         /// Items that should be.
         announced: u64,
     },
+    /// A section that goes on to the end of the file.
+    #[error("{place}: section ${name} has no end $End{name}: its name is misspelt or the file cut short")]
+    NoEnd {
+        /// Where it begins.
+        place: Place,
+        /// Its name.
+        name: String,
+    },
     /// A count that the rest of the section contradicts.
     #[error("${section} announces {announced} {items} but has {found}: save the file again")]
     Count {

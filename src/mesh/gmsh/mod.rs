@@ -117,8 +117,10 @@ impl Msh {
                     has_elements = true;
                 }
                 [b'$', name @ ..] if !name.starts_with(b"End") => {
-                    source.announce("MeshFormat", "sections", 0, 1)?;
-                    source.skip_to(&format!("$End{}", String::from_utf8_lossy(name)))?;
+                    let name = String::from_utf8_lossy(name).into_owned();
+                    if !source.skip_to(&format!("$End{name}"))? {
+                        return Err(Problem::NoEnd { place, name });
+                    }
                 }
                 other => return Err(Problem::expected(place, "the beginning of a section, as $Nodes", other)),
             }

@@ -104,14 +104,14 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// Reads on until a section ends.
-    pub fn skip_to(&mut self, end: &str) -> Result<()> {
+    /// Reads on until a section ends; whether it does.
+    pub fn skip_to(&mut self, end: &str) -> Result<bool> {
         while let Some((_, line)) = self.line()? {
             if line == end.as_bytes() {
-                return Ok(());
+                return Ok(true);
             }
         }
-        Err(self.cut_short())
+        Ok(false)
     }
 
     /// The line that ends a section.

@@ -7,7 +7,7 @@ use super::error::Problem;
 use super::volume::{higher_order, listed};
 use crate::mesh::faces::{Neighbours, key};
 use crate::mesh::split;
-use crate::mesh::tets::TetMesh;
+use crate::mesh::tets::{NamedSurface, TetMesh};
 
 /// The boundary of a volume, and the file that names parts of it.
 pub(super) struct Boundary<'a> {
@@ -35,7 +35,7 @@ impl Boundary<'_> {
     ///
     /// # Errors
     /// If a surface is missing, lies elsewhere, or inside the volume.
-    pub fn surfaces(&self, names: &[&str]) -> Result<Vec<(String, Vec<[u32; 3]>)>, Problem> {
+    pub fn surfaces(&self, names: &[&str]) -> Result<Vec<NamedSurface>, Problem> {
         let wanted = names.iter().map(|name| self.wanted(name)).collect::<Result<Vec<_>, _>>()?;
         let mut of_triangle: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
         for (surface, Surface { triangles, .. }) in wanted.iter().enumerate() {
@@ -48,21 +48,22 @@ impl Boundary<'_> {
             }
         }
         let surfaces_of = |face: &[u32; 3]| of_triangle.get(&key(*face)).into_iter().flatten().copied();
-        let mut result: Vec<_> = names.iter().map(|name| (name.to_string(), Vec::new())).collect();
+        let empty = |name: &&str| NamedSurface { name: name.to_string(), triangles: Vec::new() };
+        let mut result: Vec<_> = names.iter().map(empty).collect();
         for face in self.neighbours.outer(&self.mesh.tets) {
-            surfaces_of(&face).for_each(|surface| result[surface].1.push(face));
+            surfaces_of(&face).for_each(|surface| result[surface].triangles.push(face));
         }
         let mut inner = vec![0; names.len()];
         let inner_faces = self.neighbours.inner(&self.mesh.tets);
         inner_faces.flat_map(|face| surfaces_of(&face)).for_each(|surface| inner[surface] += 1);
 
         let volume = || self.volume.to_owned();
-        for (((name, found), inner), Surface { all, .. }) in result.iter().zip(inner).zip(&wanted) {
-            let (name, triangles) = (name.clone(), *all);
+        for ((found, inner), Surface { all, .. }) in result.iter().zip(inner).zip(&wanted) {
+            let (name, triangles) = (found.name.clone(), *all);
             if inner > 0 {
                 return Err(Problem::InnerSurface { name, volume: volume(), inner, triangles });
             }
-            if found.is_empty() {
+            if found.triangles.is_empty() {
                 return Err(Problem::ElsewhereSurface { name, triangles, volume: volume(), known: self.known() });
             }
         }

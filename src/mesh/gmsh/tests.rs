@@ -22,7 +22,7 @@ fn volume(mesh: &TetMesh) -> f64 {
 
 /// Area times normal of a surface, and the number of its triangles.
 fn area(mesh: &TetMesh, surface: usize) -> ([f64; 3], usize) {
-    let triangles = &mesh.surfaces[surface].1;
+    let triangles = &mesh.surfaces[surface].triangles;
     let vectors = triangles.iter().map(|t| area_vector(&t.map(|n| mesh.points[n as usize])));
     (vectors.fold([0.0; 3], |sum, v| std::array::from_fn(|a| sum[a] + v[a])), triangles.len())
 }
