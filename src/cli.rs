@@ -32,7 +32,7 @@ pub struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 converged; 1 finished without convergence, results written; 64 usage; \
-                          65 bad scene; 70 bug; 74 input or output failed.";
+                          65 bad scene or mesh; 70 bug; 74 input or output failed.";
 
 /// The commands.
 #[derive(Debug, Subcommand)]

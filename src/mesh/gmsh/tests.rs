@@ -120,7 +120,7 @@ fn formats_that_are_not_read_are_named() {
 fn what_does_not_fit_the_format_has_its_line() {
     assert_says(&damaged("\n0 0 1\n", "\n0 zero 1\n"), &["line ", "expected y", "`zero`"]);
     assert_says(&damaged("\n0 0 1\n", "\n0 nan 1\n"), &["node 1 ", "not a finite number"]);
-    assert_says(&damaged("3 1 \"block\"", "3 1 block"), &["line 11", "quotation marks", "`block`"]);
+    assert_says(&damaged("3 1 \"block\"", "3 1 block"), &["line 10", "quotation marks", "`block`"]);
     assert_says(&damaged("$EndNodes", "$EndNodse"), &["$EndNodes", "`$EndNodse`"]);
     assert_says(&damaged("$EndEntities", ""), &["$EndEntities", "`$Nodes`"]);
     assert_says(&damaged("$EndElements", "$EndElements\nrubbish"), &["beginning of a section", "`rubbish`"]);
