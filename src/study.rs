@@ -8,10 +8,10 @@ use thiserror::Error;
 use crate::assembly::loads::{self, Traction};
 use crate::bodies::{self, MeshError, Meshes};
 use crate::cascade;
-use crate::comm::{Comm, Shares, ordered_sum};
+use crate::comm::{Comm, Shares, all_gather_u64, ordered_sum};
 use crate::constraint::{ConstraintError, Constraints, Kind, Support};
 use crate::contact::surface::GatheredSurface;
-use crate::contact::{ContactError, ContactPair, matching};
+use crate::contact::{ContactError, ContactPair, matching, rigid};
 use crate::decomposition::bricks::Boxes;
 use crate::decomposition::twins::twins;
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
@@ -46,7 +46,7 @@ pub enum StudyError {
     /// A mesh file is missing or bad.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// Contact surfaces cannot be paired.
+    /// A contact has no conditions, or impossible ones.
     #[error(transparent)]
     Contact(#[from] ContactError),
     /// Supports contradict each other.
@@ -67,6 +67,8 @@ pub struct Discrete {
     pub surfaces: Vec<Surface>,
     /// Own subdomains and interface.
     pub decomposition: Decomposition,
+    /// Names of the contacts.
+    pub contacts: Vec<String>,
     /// All contact pairs of the scene.
     pub pairs: Vec<ContactPair>,
     /// Supports, in the order of their names.
@@ -78,7 +80,7 @@ pub struct Discrete {
     /// What the user should know of the meshes.
     pub warnings: Vec<String>,
     /// Indices of the surfaces in contact.
-    pub contact: Vec<usize>,
+    pub touching: Vec<usize>,
     /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
     pub reading_mb: Option<f64>,
 }
@@ -110,9 +112,9 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     surfaces.sort_unstable();
     surfaces.dedup();
     let index = |name: &SurfaceName| surfaces.binary_search(&surface(name)).expect("every named surface is listed");
-    let contact: Vec<usize> = scene.contact.values().flat_map(|c| [index(&c.slave), index(&c.master)]).collect();
+    let touching: Vec<usize> = scene.contact.values().flat_map(scene::Contact::surfaces).map(index).collect();
 
-    let torn = Bodies { bodies: &bodies, meshes: &tets, surfaces: &surfaces, contact: &contact };
+    let torn = Bodies { bodies: &bodies, meshes: &tets, surfaces: &surfaces, contact: &touching };
     let decomposition = decomposition::tear(&torn, cut(&scene.decomposition, &bodies), costs, comm);
     drop(tets);
     let reading_mb = reading_mb(&bodies, comm);
@@ -120,7 +122,11 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     let mut pairs = Vec::new();
     for (number, (name, contact)) in scene.contact.iter().enumerate() {
         let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
-        pairs.extend(matching::pair(number, name, &gather(&contact.slave), &gather(&contact.master))?);
+        let slave = gather(contact.slave());
+        pairs.extend(match contact {
+            scene::Contact::Surfaces { master, .. } => matching::pair(number, name, &slave, &gather(master))?,
+            scene::Contact::Rigid { rigid: obstacle, .. } => rigid::pair(number, name, &slave, obstacle)?,
+        });
     }
     let supports: Vec<Support> = scene
         .support
@@ -135,19 +141,46 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
     let constraints: Result<_, ConstraintError> = Constraints::new(comm, &decomposition, &supports, &pairs);
     let constraints = agree(comm, "supports", constraints).map_err(StudyError::Supports)?;
+    let contacts: Vec<String> = scene.contact.keys().cloned().collect();
+    refuse_held(comm, &contacts, &pairs, &constraints)?;
     Ok(Discrete {
         bodies,
         materials,
         surfaces,
         decomposition,
+        contacts,
         pairs,
         supports,
         tractions,
         constraints,
         warnings,
-        contact,
+        touching,
         reading_mb,
     })
+}
+
+/// Overlap, in diameters of a slave node's share of the surface, that may remain where supports hold both sides.
+const HELD_OVERLAP: f64 = 1e-6;
+
+/// Refuses contacts that supports violate. Collective.
+fn refuse_held(
+    comm: &dyn Comm,
+    names: &[String],
+    pairs: &[ContactPair],
+    constraints: &Constraints,
+) -> Result<(), ContactError> {
+    let mine: Vec<u64> = constraints.idle.iter().flat_map(|&(pair, left)| [pair as u64, left.to_bits()]).collect();
+    let all = all_gather_u64(comm, &mine);
+    let mut depths: Vec<(usize, f64)> =
+        all.chunks_exact(2).map(|idle| (idle[0] as usize, -f64::from_bits(idle[1]))).collect();
+    depths.sort_by_key(|(pair, _)| *pair);
+    depths.dedup_by_key(|(pair, _)| *pair);
+    depths.retain(|&(pair, depth)| depth > HELD_OVERLAP * pairs[pair].area.sqrt());
+    let Some(&(first, _)) = depths.first() else { return Ok(()) };
+    let contact = pairs[first].contact;
+    let of_contact = || depths.iter().filter(|(pair, _)| pairs[*pair].contact == contact);
+    let depth = of_contact().fold(0.0_f64, |deepest, (_, depth)| deepest.max(*depth));
+    Err(ContactError::Held { name: names[contact].clone(), nodes: of_contact().count(), depth })
 }
 
 /// Rank 0's largest resident memory so far if it has read a mesh. Collective.
@@ -182,7 +215,7 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
     let space = RowSpace::new(comm, &decomposition.shares, constraints);
     let mut partial = Vec::new();
     for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
-        let touches = subdomain.facets.iter().any(|facet| discrete.contact.contains(&facet.surface));
+        let touches = subdomain.facets.iter().any(|facet| discrete.touching.contains(&facet.surface));
         let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0, f64::from(touches)];
         for &row in rows {
             counts[match constraints.rows[row as usize].kind {
@@ -406,6 +439,7 @@ fn summarise(
     let sizes = sizes(discrete, comm);
     let space = problem.space;
     let reactions = problem.reactions(&solution.u, &solution.lambda, discrete.supports.len());
+    let contact_forces = contact_forces(problem, discrete, contact);
     let names = discrete.supports.iter().map(|s| s.name.clone());
     let maximum = |x: f64| space.maximum(x);
     let total = |count: fn(&StepRecord) -> usize| Some(solution.steps.iter().map(count).sum::<usize>() as u64);
@@ -425,7 +459,10 @@ fn summarise(
             factorisations: total(|s| s.factorisations),
         },
         active_contacts: Some(problem.active_contacts(&solution.lambda) as u64),
-        contact_force: Some(contact_force(problem, &discrete.pairs, contact)),
+        contact_force: Some(std::array::from_fn(|axis| {
+            contact_forces.iter().fold(0.0, |sum, force| sum + force[axis])
+        })),
+        contact_forces: discrete.contacts.iter().cloned().zip(contact_forces).collect(),
         reactions: names.zip(reactions).collect(),
         external_work: Some(solution.external_work),
         internal_energy: Some(solution.internal_energy),
@@ -458,21 +495,22 @@ fn qp_name(scene: &Scene, has_inequalities: bool) -> &'static str {
     }
 }
 
-/// Force that the master surfaces exert on the slaves, all contacts together.
-fn contact_force(problem: &TornProblem, pairs: &[ContactPair], contact: &[ContactState]) -> [f64; 3] {
+/// Force that the other side exerts on the slave surface of each contact.
+fn contact_forces(problem: &TornProblem, discrete: &Discrete, contact: &[ContactState]) -> Vec<[f64; 3]> {
+    let Discrete { contacts, pairs, .. } = discrete;
     let mut of_pair = vec![None; pairs.len()];
     contact.iter().for_each(|state| of_pair[state.pair] = Some(state.force));
     let mut partial = Vec::new();
     for rows in problem.space.owned() {
-        let mut sum = [0.0; 3];
+        let mut sums = vec![[0.0; 3]; contacts.len()];
         for &row in rows {
             if let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind {
-                let force = of_pair[pair].unwrap_or_default();
-                (0..3).for_each(|a| sum[a] -= force * pairs[pair].normal[a]);
+                let (force, ContactPair { contact, normal, .. }) = (of_pair[pair].unwrap_or_default(), &pairs[pair]);
+                (0..3).for_each(|a| sums[*contact][a] -= force * normal[a]);
             }
         }
-        partial.extend(sum);
+        partial.extend_from_slice(sums.as_flattened());
     }
-    let sum = problem.space.sum(&partial, 3);
-    [sum[0], sum[1], sum[2]]
+    let sum = problem.space.sum(&partial, 3 * contacts.len());
+    sum.as_chunks::<3>().0.to_vec()
 }

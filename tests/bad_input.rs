@@ -78,6 +78,18 @@ fn surfaces_that_nowhere_face_each_other_are_no_contact() {
 }
 
 #[test]
+fn obstacles_that_make_no_sense_are_refused() {
+    let refused = |sets: &[&str], parts: &[&str]| assert_scene_refused("step-42", sets, BAD_SCENE, parts);
+    refused(&["contact.ball.rigid.sphere.radius=-0.6"], &["contact.ball.rigid.sphere.radius = -0.6", "positive"]);
+    refused(&["contact.ball.rigid={sphere = {centre = [0, 0, 0]}}"], &["contact.ball.rigid", "radius"]);
+    refused(&["contact.ball.rigid.plane={point = [0, 0, 0], normal = [0, 0, 1]}"], &["contact.ball.rigid.plane"]);
+    refused(&["contact.ball.master=cube.zmin"], &["contact.ball.master", "either master or rigid"]);
+    refused(&["contact.ball.rigid.sphere.centre.2=-5"], &["contact.ball", "289", "faces the obstacle"]);
+    let under = ["contact.ball.slave=cube.zmin", "contact.ball.rigid.sphere.centre.2=-0.59"];
+    refused(&under, &["contact.ball", "supports hold 13 of its nodes", "1.00e-2 deep"]);
+}
+
+#[test]
 fn a_body_that_nothing_holds_is_named_with_its_free_motions() {
     let text = include_str!("../src/scene/library/bar.toml").replace("fix = [\"z\"]", "fix = [\"y\"]");
     let directory = tempfile::tempdir().unwrap();

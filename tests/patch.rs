@@ -4,8 +4,8 @@
 
 mod common;
 
-use common::fields::Fields;
-use common::{Run, assert_close, number, solve, vector};
+use common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
+use common::{Run, assert_close, number, solve, solve_tightly, vector};
 
 const YOUNG: f64 = 210_000.0;
 const POISSON: f64 = 0.29;
@@ -13,12 +13,9 @@ const YIELD: f64 = 450.0;
 const HARDENING: f64 = 10_000.0;
 
 const RANKS: usize = 2;
-const EXACT: f64 = 1e-9;
-const TIGHT: [&str; 3] =
-    ["solver.newton_tolerance=1e-11", "solver.residual_tolerance=1e-11", "solver.qp_tolerance=1e-13"];
 
 fn tightly(scene: &str, sets: &[&str]) -> Run {
-    solve(RANKS, scene, &[&TIGHT[..], sets].concat()).converged()
+    solve_tightly(RANKS, scene, sets)
 }
 
 /// Strains along and across a uniaxial stress, and the equivalent plastic strain.
@@ -26,25 +23,6 @@ fn uniaxial(stress: f64) -> (f64, f64, f64) {
     let plastic = (stress.abs() - YIELD).max(0.0) / HARDENING;
     let kappa = plastic * stress.signum();
     (stress / YOUNG + kappa, -POISSON * stress / YOUNG - kappa / 2.0, plastic)
-}
-
-/// Fails unless every value is the expected one, relative to `scale`.
-#[track_caller]
-fn assert_uniform(what: &str, values: impl IntoIterator<Item = f64>, expected: f64, scale: f64) {
-    let errors = values.into_iter().map(|value| ((value - expected) / scale).abs());
-    let worst = errors.fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a });
-    assert!(worst <= EXACT, "{what}: relative error {worst:.2e} against {expected}");
-}
-
-/// Fails unless every node has the displacement that `exact` gives for it.
-#[track_caller]
-fn assert_displacement(fields: &Fields, exact: impl Fn(usize) -> [f64; 3]) {
-    let expected: Vec<[f64; 3]> = (0..fields.points.len()).map(exact).collect();
-    let size = expected.as_flattened().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-    for axis in 0..3 {
-        let errors = fields.displacement.iter().zip(&expected).map(|(u, exact)| u[axis] - exact[axis]);
-        assert_uniform(&format!("displacement along axis {axis}"), errors, 0.0, size);
-    }
 }
 
 #[track_caller]

@@ -113,3 +113,9 @@ fn ranks_without_a_subdomain_stay_idle_and_change_nothing() {
 fn a_scene_without_contact_gives_the_same_bits_on_1_2_3_and_5_ranks() {
     assert_eq!(assert_independent_of_ranks("shear", &[], &RANKS), 8);
 }
+
+#[test]
+fn contact_with_an_obstacle_gives_the_same_bits_on_1_2_3_and_5_ranks() {
+    let sets = ["body.cube.brick.cells=[8, 8, 8]", "decomposition.cells=[4, 4, 4]"];
+    assert_eq!(assert_independent_of_ranks("step-42", &sets, &RANKS), 8);
+}

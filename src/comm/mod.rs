@@ -82,7 +82,8 @@ impl Shares {
 pub fn ordered_sum(comm: &dyn Comm, shares: &Shares, mine: &[f64], width: usize) -> Vec<f64> {
     let rows = comm.gather(mine, &shares.counts(width));
     let mut sum = vec![0.0; width];
-    for row in rows.chunks_exact(width) {
+    // Nothing is summed where the width is zero.
+    for row in rows.chunks_exact(width.max(1)) {
         for (s, value) in sum.iter_mut().zip(row) {
             *s += value;
         }

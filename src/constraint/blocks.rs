@@ -42,7 +42,7 @@ impl Constraints {
             entries: vec![Vec::new(); decomposition.subdomains.len()],
             copies: local_copies(decomposition),
             has_inequalities: !pairs.is_empty(),
-            idle_pairs: 0,
+            idle: Vec::new(),
         };
         for key in keys {
             let single = Cluster { nodes: BTreeSet::from([key]), pairs: Vec::new() };
@@ -55,13 +55,16 @@ impl Constraints {
                 rows.extend(dirichlet::rows(interface, &fixed));
                 sides.insert(interface.node, (interface, fixed));
             }
-            for &pair in &cluster.pairs {
-                let (slave, master) = (sides[&pairs[pair].slave], sides[&pairs[pair].master]);
-                match contact::row(pair, &pairs[pair], slave, master) {
-                    Some(row) => rows.push(row),
-                    None => result.idle_pairs += 1,
+            let mut contacts: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
+            for &number in &cluster.pairs {
+                let pair = &pairs[number];
+                let masters: Vec<Side> = pair.masters.iter().map(|(node, _)| sides[node]).collect();
+                match contact::row(number, pair, sides[&pair.slave], &masters) {
+                    Ok(row) => contact::add_tightest(contacts.entry(pair.slave).or_default(), row),
+                    Err(left) => result.idle.push((number, left)),
                 }
             }
+            rows.extend(contacts.into_values().flatten());
             let subdomains: BTreeSet<u32> = sides.values().flat_map(|(n, _)| n.copies.iter().copied()).collect();
             result.push_block(rows, subdomains.into_iter().collect(), decomposition);
         }
@@ -100,9 +103,14 @@ impl Constraints {
     }
 }
 
+/// Nodes that a pair ties together.
+fn nodes_of(pair: &ContactPair) -> impl Iterator<Item = u64> {
+    [pair.slave].into_iter().chain(pair.masters.iter().map(|(node, _)| *node))
+}
+
 /// Copies and surfaces of all nodes in contact, on every rank.
 fn gather_nodes(comm: &dyn Comm, decomposition: &Decomposition, pairs: &[ContactPair]) -> BTreeMap<u64, InterfaceNode> {
-    let wanted: BTreeSet<u64> = pairs.iter().flat_map(|p| [p.slave, p.master]).collect();
+    let wanted: BTreeSet<u64> = pairs.iter().flat_map(nodes_of).collect();
     let mut mine = Vec::new();
     for node in decomposition.interface.iter().filter(|n| wanted.contains(&n.node)) {
         // The rank of the lowest copy speaks for the node.
@@ -126,8 +134,10 @@ fn clusters(pairs: &[ContactPair]) -> (HashMap<u64, u64>, BTreeMap<u64, Cluster>
         top
     }
     for pair in pairs {
-        let (a, b) = (root(&mut parent, pair.slave), root(&mut parent, pair.master));
-        parent.insert(a.max(b), a.min(b));
+        for node in nodes_of(pair) {
+            let (a, b) = (root(&mut parent, pair.slave), root(&mut parent, node));
+            parent.insert(a.max(b), a.min(b));
+        }
     }
     let mut clusters: BTreeMap<u64, Cluster> = BTreeMap::new();
     let mut names = HashMap::new();

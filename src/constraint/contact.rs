@@ -1,28 +1,36 @@
-//! Contact rows: `normal . (mean of the slave's copies - mean of the master's) <= gap`, made a unit vector.
+//! Contact rows: `normal . (mean of the slave's copies - means of the masters') <= gap`, made a unit vector.
 //!
 //! Components that a support fixes leave the row and go to its right-hand side: contact rows stay orthogonal to
-//! support rows and the active rows independent.
+//! support rows and the active rows independent. Of rows with one direction (a node that meets two obstacles alike) only
+//! the tightest counts, which implies the others.
 
 use super::{Kind, Row, Term};
 use crate::contact::ContactPair;
 use crate::decomposition::InterfaceNode;
 
-/// One side of a contact: the node and what supports fix there.
+/// One node of a contact: what supports fix there.
 pub(super) type Side<'a> = (&'a InterfaceNode, [Option<(usize, f64)>; 3]);
 
-/// The row of a pair; `None` if supports fix both nodes along the normal.
-pub(super) fn row(number: usize, pair: &ContactPair, slave: Side, master: Side) -> Option<Row> {
+/// Cosine from which two rows have one direction.
+const PARALLEL: f64 = 1.0 - 1e-12;
+
+/// The row of a pair, with the sides of its slave and of each of its masters.
+///
+/// # Errors
+/// If supports fix all nodes along the normal: the distance that is left for good (length).
+pub(super) fn row(number: usize, pair: &ContactPair, slave: Side, masters: &[Side]) -> Result<Row, f64> {
     let mut rhs = pair.gap;
     let mut terms = Vec::new();
     let mut square = 0.0;
-    for ((node, fixed), sign) in [(slave, 1.0), (master, -1.0)] {
-        let weight = sign / node.copies.len() as f64;
+    let others = masters.iter().zip(&pair.masters).map(|(side, (_, weight))| (*side, -weight));
+    for ((node, fixed), factor) in [(slave, 1.0)].into_iter().chain(others) {
+        let weight = factor / node.copies.len() as f64;
         for (axis, (component, held)) in pair.normal.into_iter().zip(fixed).enumerate() {
             match held {
-                Some((_, value)) => rhs -= sign * component * value,
+                Some((_, value)) => rhs -= factor * component * value,
                 None if component == 0.0 => {}
                 None => {
-                    square += component * component / node.copies.len() as f64;
+                    square += component * component * factor * factor / node.copies.len() as f64;
                     let term = |&subdomain| Term { subdomain, node: node.node, axis, value: weight * component };
                     terms.extend(node.copies.iter().map(term));
                 }
@@ -31,9 +39,24 @@ pub(super) fn row(number: usize, pair: &ContactPair, slave: Side, master: Side) 
     }
     // A direction fixed but for round-off in the normal is fixed.
     if square < 1e-16 {
-        return None;
+        return Err(rhs);
     }
     let scale = 1.0 / square.sqrt();
     terms.iter_mut().for_each(|term| term.value *= scale);
-    Some(Row { kind: Kind::Contact { pair: number }, rhs: scale * rhs, scale, terms })
+    Ok(Row { kind: Kind::Contact { pair: number }, rhs: scale * rhs, scale, terms })
+}
+
+/// Adds a row to those of the same slave node, unless one of them implies it; takes its place where it implies that one.
+pub(super) fn add_tightest(rows: &mut Vec<Row>, row: Row) {
+    let same = |a: &Term, b: &Term| (a.subdomain, a.node, a.axis) == (b.subdomain, b.node, b.axis);
+    let parallel = |other: &&mut Row| {
+        other.terms.len() == row.terms.len()
+            && other.terms.iter().zip(&row.terms).all(|(a, b)| same(a, b))
+            && other.terms.iter().zip(&row.terms).map(|(a, b)| a.value * b.value).sum::<f64>() > PARALLEL
+    };
+    match rows.iter_mut().find(parallel) {
+        Some(other) if other.rhs <= row.rhs => {}
+        Some(other) => *other = row,
+        None => rows.push(row),
+    }
 }

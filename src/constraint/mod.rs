@@ -6,7 +6,7 @@
 //!
 //! Supports and contact act on the mean over the copies and are therefore orthogonal to gluing (design: "Constraint
 //! rows"). The counts are those of the paper's Table 2: gluing `copies - 1` a component, one support row a node and
-//! component, one contact row a slave node.
+//! component, one contact row a slave node and contact.
 
 pub mod blocks;
 pub mod contact;
@@ -113,8 +113,9 @@ pub struct Constraints {
     pub copies: Vec<Vec<(u32, u32)>>,
     /// Whether any rank has contact rows.
     pub has_inequalities: bool,
-    /// Number of contact pairs without a row, because supports fix both nodes along the normal.
-    pub idle_pairs: usize,
+    /// Contact pairs of own nodes without a row, because supports fix all of their nodes along the normal, and the distance
+    /// that is left (length).
+    pub idle: Vec<(usize, f64)>,
 }
 
 /// Why the rows cannot be set up.

@@ -55,12 +55,13 @@ fn a_common_motion_leaves_gluing_at_rest_and_is_seen_by_supports_and_contact() {
                         (row.terms.len() as f64).sqrt() * motion(point(setup, row.terms[0].node))[axis]
                     }
                     Kind::Contact { pair } => {
-                        let ContactPair { slave, master, normal, .. } = setup.discrete.pairs[pair];
+                        let ContactPair { slave, ref masters, normal, .. } = setup.discrete.pairs[pair];
                         let part = |node: u64, axis: usize| {
                             let free = row.terms.iter().any(|t| (t.node, t.axis) == (node, axis));
                             if free { normal[axis] * motion(point(setup, node))[axis] } else { 0.0 }
                         };
-                        row.scale * (0..3).map(|a| part(slave, a) - part(master, a)).sum::<f64>()
+                        let mean = |a: usize| masters.iter().map(|(node, w)| w * part(*node, a)).sum::<f64>();
+                        row.scale * (0..3).map(|a| part(slave, a) - mean(a)).sum::<f64>()
                     }
                 };
                 assert!((found - expected).abs() < 1e-14 * size, "{row:?}");
@@ -122,25 +123,53 @@ fn a_pair_fixed_on_both_sides_along_the_normal_has_no_row() {
             assert_eq!((setup.discrete.pairs.len(), contact), (15, 12));
         });
     }
-    on_ranks(&flush, 1, |setup| assert_eq!(setup.discrete.constraints.idle_pairs, 3));
+    on_ranks(&flush, 1, |setup| assert_eq!(setup.discrete.constraints.idle.len(), 3));
+}
+
+fn node(node: u64, copies: &[u32]) -> InterfaceNode {
+    InterfaceNode { node, copies: copies.to_vec(), surfaces: vec![] }
+}
+
+fn pair(masters: &[(u64, f64)]) -> ContactPair {
+    ContactPair { contact: 0, slave: 7, masters: masters.to_vec(), normal: [0.6, 0.0, 0.8], gap: 0.5, area: 1.0 }
+}
+
+/// Sum of a row's coefficients at a node, as before it was made a unit vector.
+fn coefficient(row: &Row, node: u64, axis: usize) -> f64 {
+    row.terms.iter().filter(|t| (t.node, t.axis) == (node, axis)).map(|t| t.value / row.scale).sum()
 }
 
 #[test]
 fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_hand_side() {
-    let node = |node, copies: &[u32]| InterfaceNode { node, copies: copies.to_vec(), surfaces: vec![] };
-    let pair = ContactPair { contact: 0, slave: 7, master: 8, normal: [0.6, 0.0, 0.8], gap: 0.5, area: 1.0 };
-    let (slave, master) = (node(7, &[0, 3]), node(8, &[1, 2, 4]));
-    let held = [Some((0, 0.25)), None, None];
-    let row = contact::row(3, &pair, (&slave, held), (&master, [None; 3])).expect("much is free");
+    let pair = pair(&[(8, 0.25), (9, 0.75)]);
+    let [slave, left, right] = [node(7, &[0, 3]), node(8, &[1, 2, 4]), node(9, &[2])];
+    let (held, free) = ([Some((0, 0.25)), None, None], [None; 3]);
+    let row = contact::row(3, &pair, (&slave, held), &[(&left, free), (&right, held)]).expect("much is free");
     let square: f64 = row.terms.iter().map(|t| t.value * t.value).sum();
     assert!((square - 1.0).abs() < 1e-15);
-    assert!((row.rhs - row.scale * (0.5 - 0.6 * 0.25)).abs() < 1e-15);
-    let coefficient = |node: u64, axis: usize| -> f64 {
-        row.terms.iter().filter(|t| (t.node, t.axis) == (node, axis)).map(|t| t.value / row.scale).sum()
-    };
-    for (node, axis, expected) in [(7, 0, 0.0), (7, 1, 0.0), (7, 2, 0.8), (8, 0, -0.6), (8, 1, 0.0), (8, 2, -0.8)] {
-        assert!((coefficient(node, axis) - expected).abs() < 1e-15, "{node} {axis}");
+    assert!((row.rhs - row.scale * (0.5 - 0.6 * 0.25 + 0.75 * 0.6 * 0.25)).abs() < 1e-15);
+    let expected = [(7, [0.0, 0.0, 0.8]), (8, [-0.25 * 0.6, 0.0, -0.25 * 0.8]), (9, [0.0, 0.0, -0.75 * 0.8])];
+    for (node, expected) in expected {
+        for (axis, expected) in expected.into_iter().enumerate() {
+            assert!((coefficient(&row, node, axis) - expected).abs() < 1e-15, "{node} {axis}");
+        }
     }
-    let all = [Some((0, 0.0)); 3];
-    assert_eq!(contact::row(3, &pair, (&slave, all), (&master, all)), None);
+    let all = [Some((0, 0.1)); 3];
+    let left = contact::row(3, &pair, (&slave, all), &[(&left, all), (&right, all)]).unwrap_err();
+    assert!((left - 0.5).abs() < 1e-15, "a common motion leaves the gap: {left}");
+}
+
+#[test]
+fn of_contacts_in_one_direction_the_tightest_counts() {
+    let slave = node(7, &[0, 3]);
+    let row = |number: usize, gap: f64, normal: [f64; 3]| {
+        contact::row(number, &ContactPair { gap, normal, ..pair(&[]) }, (&slave, [None; 3]), &[]).expect("it is free")
+    };
+    let (up, down) = ([0.6, 0.0, 0.8], [-0.6, 0.0, -0.8]);
+    let mut rows = Vec::new();
+    for (number, gap, normal) in [(0, 0.5, up), (1, -0.5, down), (2, 0.2, up), (3, 0.3, up), (4, 0.1, [0.0, 0.6, 0.8])]
+    {
+        contact::add_tightest(&mut rows, row(number, gap, normal));
+    }
+    assert_eq!(rows, [row(2, 0.2, up), row(1, -0.5, down), row(4, 0.1, [0.0, 0.6, 0.8])]);
 }

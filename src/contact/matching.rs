@@ -28,8 +28,8 @@ pub fn pair(
         let point = slave.points[index];
         match grid.opposite(point, normal) {
             Some((found, gap)) => {
-                let (slave, master) = (slave.nodes[index], master.nodes[found]);
-                pairs.push(ContactPair { contact, slave, master, normal, gap, area });
+                let (slave, masters) = (slave.nodes[index], vec![(master.nodes[found], 1.0)]);
+                pairs.push(ContactPair { contact, slave, masters, normal, gap, area });
             }
             None => unmatched += usize::from(hits(master, point, normal, spacing)),
         }
@@ -143,7 +143,7 @@ mod tests {
             let pairs = pair(0, "joint", &square(4, 1.0, gap, false, 100), &square(4, 1.0, 0.0, true, 0)).unwrap();
             assert_eq!(pairs.len(), 25);
             for p in &pairs {
-                assert_eq!(p.slave, p.master + 100);
+                assert_eq!(p.masters, [(p.slave - 100, 1.0)]);
                 assert_eq!(p.normal, [0.0, 0.0, -1.0]);
                 assert!((p.gap - gap).abs() < 1e-14);
             }

@@ -1,24 +1,27 @@
 //! Contact geometry: which points of two surfaces face each other, normals and gaps. No unknowns, no multipliers.
 //!
-//! Surfaces are two-dimensional, so every rank sees both sides of each contact whole, for the time of the pairing
-//! only; what is kept of it are the pairs.
+//! Every condition is one on a slave node: against a weighted mean of master nodes ([`matching`]: of one), or against a rigid
+//! obstacle ([`rigid`]). Surfaces are two-dimensional, so every rank sees both sides of each contact whole,
+//! for the time of the pairing only; what is kept of it are the pairs.
 
 pub mod matching;
+pub mod rigid;
 pub mod surface;
 
 use thiserror::Error;
 
-/// A node of the slave surface and the point of the master surface that it meets: linearised frictionless contact
-/// `normal . (u_slave - u_master) <= gap`.
+/// A node of the slave surface and what it meets: linearised frictionless contact
+/// `normal . (u_slave - sum of weight u_master) <= gap`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactPair {
     /// Index of the contact in the scene.
     pub contact: usize,
     /// Global node on the slave surface.
     pub slave: u64,
-    /// Global node on the master surface.
-    pub master: u64,
-    /// Unit outward normal of the slave surface at the node: mean of the adjacent triangles' area vectors.
+    /// Global nodes on the master surface with their weights, which add up to one; none on a rigid obstacle.
+    pub masters: Vec<(u64, f64)>,
+    /// Unit vector towards the other side. Between surfaces: the outward normal of the slave surface at the node, mean of
+    /// the adjacent triangles' area vectors. At a rigid obstacle: straight into it.
     pub normal: [f64; 3],
     /// Initial distance along the normal (length); negative where the bodies overlap.
     pub gap: f64,
@@ -27,7 +30,7 @@ pub struct ContactPair {
 }
 
 /// Why two surfaces cannot be paired.
-#[derive(Debug, Error, PartialEq, Eq)]
+#[derive(Debug, Error, PartialEq)]
 pub enum ContactError {
     /// The slave surface meets the master surface at places that are not its nodes.
     #[error(
@@ -50,5 +53,29 @@ pub enum ContactError {
     Apart {
         /// Name of the contact in the scene.
         name: String,
+    },
+    /// All of a slave surface is turned away from a rigid obstacle, or beside it.
+    #[error(
+        "contact.{name}: none of the {slaves} nodes of the slave surface faces the obstacle; check its place and which side \
+         is free (normal, inside, above), and the name of the surface"
+    )]
+    LooksAway {
+        /// Name of the contact in the scene.
+        name: String,
+        /// All slave nodes.
+        slaves: usize,
+    },
+    /// Supports hold a slave node where it overlaps with the other side.
+    #[error(
+        "contact.{name}: supports hold {nodes} of its nodes inside the other side, up to {depth:.2e} deep; move the bodies apart, \
+         or leave the direction towards the other side free where they meet"
+    )]
+    Held {
+        /// Name of the contact in the scene.
+        name: String,
+        /// Slave nodes that are held so.
+        nodes: usize,
+        /// Deepest of them (length).
+        depth: f64,
     },
 }

@@ -33,15 +33,16 @@ pub fn piece(
 ) -> Piece {
     let mut piece = Piece { offsets: vec![0], ..Piece::default() };
     let (mut displacement, mut stress, mut plastic) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut pressure, mut gap) = (Vec::new(), Vec::new());
+    let (mut pressure, mut gap, mut status) = (Vec::new(), Vec::new(), Vec::new());
     let (mut subdomain_ids, mut bodies) = (Vec::new(), Vec::new());
     for (subdomain, u) in decomposition.subdomains.iter().zip(u) {
         let first = piece.points.len() as u64;
         piece.points.extend(&subdomain.points);
         displacement.extend(u.chunks_exact(3).map(|u| [u[0], u[1], u[2]]));
-        let [p, g] = slave_fields(subdomain, pairs, contact);
-        pressure.extend(p);
-        gap.extend(g);
+        let slaves = slave_fields(subdomain, pairs, contact);
+        pressure.extend(slaves.pressure);
+        gap.extend(slaves.gap);
+        status.extend(slaves.status);
         for nodes in &subdomain.elements {
             piece.connectivity.extend(nodes.map(|n| first + u64::from(n)));
             piece.offsets.push(piece.connectivity.len() as u64);
@@ -57,6 +58,7 @@ pub fn piece(
         Field::vector("displacement", &displacement),
         Field::scalar("contact_pressure", pressure),
         Field::scalar("contact_gap", gap),
+        Field::integer("contact_status", status),
     ];
     piece.cell_data = vec![
         Field::scalar("von_mises", stress),
@@ -89,16 +91,27 @@ fn element_state(subdomain: &Subdomain, material: &Material, nodes: &[u32; 4], u
     (tensor::von_mises(&response.stress), response.kappa)
 }
 
-/// Pressure (zero off the slave surfaces) and gap (NaN off them) at each node of a subdomain.
-fn slave_fields(subdomain: &Subdomain, pairs: &[ContactPair], contact: &[ContactState]) -> [Vec<f64>; 2] {
-    let mut pressure = vec![0.0; subdomain.nodes.len()];
-    let mut gap = vec![f64::NAN; subdomain.nodes.len()];
+/// Contact at the nodes of a subdomain: where a node is in several contacts, the sum of the pressures and the smallest gap.
+struct SlaveFields {
+    /// Zero off the slave surfaces.
+    pressure: Vec<f64>,
+    /// Not a number off them.
+    gap: Vec<f64>,
+    /// 1 where a contact is closed, 0 where none is, -1 off the slave surfaces.
+    status: Vec<i64>,
+}
+
+fn slave_fields(subdomain: &Subdomain, pairs: &[ContactPair], contact: &[ContactState]) -> SlaveFields {
+    let nodes = subdomain.nodes.len();
+    let mut fields = SlaveFields { pressure: vec![0.0; nodes], gap: vec![f64::NAN; nodes], status: vec![-1; nodes] };
     for state in contact {
         let pair = &pairs[state.pair];
         if let Some(node) = subdomain.local_node(pair.slave) {
-            pressure[node] = state.force / pair.area;
-            gap[node] = state.gap;
+            fields.pressure[node] += state.force / pair.area;
+            // Whatever is smaller than not a number is the number.
+            fields.gap[node] = state.gap.min(fields.gap[node]);
+            fields.status[node] = fields.status[node].max(i64::from(state.force > 0.0));
         }
     }
-    [pressure, gap]
+    fields
 }

@@ -43,8 +43,10 @@ pub struct Summary {
     pub counters: Counters,
     /// Contact pairs that transmit pressure.
     pub active_contacts: Option<u64>,
-    /// Force on the slave surfaces.
+    /// Force on the slave surfaces of all contacts together.
     pub contact_force: Option<[f64; 3]>,
+    /// Force on the slave surface of each contact.
+    pub contact_forces: BTreeMap<String, [f64; 3]>,
     /// Force of each support on the bodies.
     pub reactions: BTreeMap<String, [f64; 3]>,
     /// Work of the loads, `f'u`.

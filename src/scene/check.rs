@@ -7,14 +7,15 @@ use std::fmt::Debug;
 
 use super::Scene;
 use super::body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
+use super::contact::Contact;
 use super::decomposition::Decomposition;
 use super::error::Fault;
 use super::held::Held;
 use super::material::Material;
 use super::solver::Solver;
-use super::surface::{Contact, Face, Load, Support, SurfaceName};
+use super::surface::{Face, Load, Support, SurfaceName};
 
-type Checked = Result<(), Fault>;
+pub(super) type Checked = Result<(), Fault>;
 
 /// The first fault of a scene, in the order of its sections.
 pub(super) fn scene(scene: &Scene) -> Checked {
@@ -33,7 +34,7 @@ pub(super) fn scene(scene: &Scene) -> Checked {
 }
 
 /// Passes if `holds`; else the fault reads `key = value: rule`.
-fn require(holds: bool, key: &str, value: impl Debug, rule: impl Into<String>) -> Checked {
+pub(super) fn require(holds: bool, key: &str, value: impl Debug, rule: impl Into<String>) -> Checked {
     if holds {
         Ok(())
     } else {
@@ -45,7 +46,7 @@ fn whole(key: &str, rule: impl Into<String>) -> Fault {
     Fault { key: key.to_owned(), value: None, rule: rule.into() }
 }
 
-fn all_finite(key: &str, values: [f64; 3]) -> Checked {
+pub(super) fn all_finite(key: &str, values: &[f64]) -> Checked {
     require(values.iter().all(|value| value.is_finite()), key, values, "must be finite numbers")
 }
 
@@ -77,7 +78,7 @@ fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
 }
 
 fn brick(key: &str, &Brick { origin, size, cells }: &Brick) -> Checked {
-    all_finite(&format!("{key}.brick.origin"), origin)?;
+    all_finite(&format!("{key}.brick.origin"), &origin)?;
     let positive = size.iter().all(|edge| edge.is_finite() && *edge > 0.0);
     require(positive, &format!("{key}.brick.size"), size, "edges must be positive and finite")?;
     let key = format!("{key}.brick.cells");
@@ -96,7 +97,7 @@ fn gmsh(key: &str, Gmsh { file, scale, rotate, translate, .. }: &Gmsh) -> Checke
         require(length.is_normal(), &format!("{key}.rotate.axis"), axis, rule)?;
         require(angle_deg.is_finite(), &format!("{key}.rotate.angle_deg"), angle_deg, "must be finite")?;
     }
-    all_finite(&format!("{key}.translate"), *translate)
+    all_finite(&format!("{key}.translate"), translate)
 }
 
 /// Surfaces of mesh files are looked up when these are read.
@@ -122,7 +123,7 @@ fn support(scene: &Scene, key: &str, support: &Support) -> Checked {
     require(once, &fix_key, &fix, "name each of x, y, z at most once")?;
     let Some(values) = support.displacement else { return Ok(()) };
     let key = format!("{key}.displacement");
-    all_finite(&key, values)?;
+    all_finite(&key, &values)?;
     for axis in Axis::ALL {
         let used = support.fix.contains(&axis) || values[axis.index()] == 0.0;
         require(used, &key, values, format!("component {axis} is not fixed, so it must be 0: add {axis} to fix"))?;
@@ -132,16 +133,20 @@ fn support(scene: &Scene, key: &str, support: &Support) -> Checked {
 
 fn load(scene: &Scene, key: &str, load: &Load) -> Checked {
     surface(scene, &format!("{key}.surface"), &load.surface)?;
-    all_finite(&format!("{key}.traction"), load.traction)
+    all_finite(&format!("{key}.traction"), &load.traction)
 }
 
 fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
-    surface(scene, &format!("{key}.slave"), &contact.slave)?;
-    let Contact { slave, master } = contact;
-    let key = format!("{key}.master");
-    surface(scene, &key, master)?;
-    let rule = "slave and master must be on different bodies; a body does not touch itself";
-    require(slave.body != master.body, &key, master.to_string(), rule)
+    surface(scene, &format!("{key}.slave"), contact.slave())?;
+    match contact {
+        Contact::Surfaces { slave, master } => {
+            let key = format!("{key}.master");
+            surface(scene, &key, master)?;
+            let rule = "slave and master must be on different bodies; a body does not touch itself";
+            require(slave.body != master.body, &key, master.to_string(), rule)
+        }
+        Contact::Rigid { rigid, .. } => rigid.check(&format!("{key}.rigid")),
+    }
 }
 
 fn decomposition(scene: &Scene) -> Checked {

@@ -1,9 +1,10 @@
 //! Scenes that come with the program; `fetiplast show NAME` prints one to start from.
 
-const SCENES: [(&str, &str); 5] = [
+const SCENES: [(&str, &str); 6] = [
     ("bar", include_str!("library/bar.toml")),
     ("patch", include_str!("library/patch.toml")),
     ("shear", include_str!("library/shear.toml")),
+    ("step-42", include_str!("library/step-42.toml")),
     ("two-blocks", include_str!("library/two-blocks.toml")),
     ("two-blocks-elastic", include_str!("library/two-blocks-elastic.toml")),
 ];

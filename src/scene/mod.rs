@@ -8,6 +8,7 @@
 
 mod body;
 mod check;
+mod contact;
 mod decomposition;
 mod error;
 mod held;
@@ -24,12 +25,13 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 pub use body::{Axis, Body, Brick, Element, Gmsh, Rotation, Shape};
+pub use contact::{Contact, Obstacle};
 pub use decomposition::{Decomposition, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use held::Held;
 pub use material::Material;
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
-pub use surface::{Contact, Face, Load, Support, SurfaceError, SurfaceName};
+pub use surface::{Face, Load, Support, SurfaceError, SurfaceName};
 
 /// A study: bodies, what holds and loads them, where they touch, how to cut and how to solve.
 ///
@@ -49,7 +51,7 @@ pub struct Scene {
     pub support: BTreeMap<String, Support>,
     /// Tractions by name; several on one surface add up.
     pub load: BTreeMap<String, Load>,
-    /// Contact pairs by name.
+    /// Contacts by name.
     pub contact: BTreeMap<String, Contact>,
     /// How bodies are cut into subdomains.
     pub decomposition: Decomposition,
@@ -118,7 +120,7 @@ impl Scene {
     fn settle_surfaces(&mut self) {
         let supports = self.support.values_mut().map(|s| &mut s.surface);
         let loads = self.load.values_mut().map(|l| &mut l.surface);
-        let contacts = self.contact.values_mut().flat_map(|c| [&mut c.slave, &mut c.master]);
+        let contacts = self.contact.values_mut().flat_map(Contact::surfaces_mut);
         supports.chain(loads).chain(contacts).for_each(|surface| surface.settle(self.body.keys()));
     }
 
@@ -135,12 +137,12 @@ impl Scene {
     pub fn surfaces(&self) -> impl Iterator<Item = &SurfaceName> {
         let supports = self.support.values().map(|s| &s.surface);
         let loads = self.load.values().map(|l| &l.surface);
-        supports.chain(loads).chain(self.contact.values().flat_map(|c| [&c.slave, &c.master]))
+        supports.chain(loads).chain(self.contact.values().flat_map(Contact::surfaces))
     }
 
     /// Whether a body takes part in a contact.
     pub fn touches(&self, body: &str) -> bool {
-        self.contact.values().any(|pair| pair.slave.body == body || pair.master.body == body)
+        self.contact.values().flat_map(Contact::surfaces).any(|surface| surface.body == body)
     }
 
     /// Sentences about what is legal but easily a mistake: bricks that only contact can hold. Bodies from mesh files are

@@ -1,4 +1,4 @@
-//! Surfaces, addressed as `body.surface`, and what happens on them: supports, loads, contact.
+//! Surfaces, addressed as `body.surface`, and what happens on them: supports and loads.
 
 use std::fmt;
 use std::str::FromStr;
@@ -136,14 +136,4 @@ pub struct Load {
     pub surface: SurfaceName,
     /// Force per undeformed area, in coordinate directions (a stress).
     pub traction: [f64; 3],
-}
-
-/// Two surfaces that may touch without friction. Each slave node carries one condition.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Contact {
-    /// The surface whose nodes are checked.
-    pub slave: SurfaceName,
-    /// The surface of another body, which they must not enter.
-    pub master: SurfaceName,
 }

@@ -73,7 +73,7 @@ fn two_blocks_is_the_benchmark() {
     assert_eq!(scene.body.values().map(|body| body.brick().unwrap().cell_count()).sum::<usize>(), 6000);
     assert_eq!(scene.material["upper"], scene.material["lower"]);
     assert_eq!(scene.load["top"].traction, [0.0, 0.0, -150.0]);
-    assert_eq!(scene.contact["joint"].slave.to_string(), "upper.zmin");
+    assert_eq!(scene.contact["joint"].slave().to_string(), "upper.zmin");
     assert_eq!(scene.decomposition, Decomposition::Bricks { cells: PAPER_CELLS });
     assert_eq!(scene.solver, Solver::default());
 }
@@ -112,7 +112,10 @@ fn levels_refine_cells_but_not_subdomains() {
 
 #[test]
 fn unknown_scenes_list_the_known() {
-    assert_says(Scene::load("three-blocks", 1, &[]), &["three-blocks", "bar, patch, shear, two-blocks", "path"]);
+    assert_says(
+        Scene::load("three-blocks", 1, &[]),
+        &["three-blocks", "bar, patch, shear, step-42, two-blocks", "path"],
+    );
     assert_says(Scene::load("no/such.toml", 1, &[]), &["no/such.toml"]);
 }
 
@@ -277,6 +280,44 @@ fn contact_pairs_are_checked() {
 }
 
 #[test]
+fn a_contact_has_one_second_side() {
+    let ground = "{plane = {point = [0, 0, 0], normal = [0, 0, 1]}}";
+    let rigid = |with: &str| one(&[&format!("contact.ground={{slave = 'block.zmin', {with}}}")]);
+    assert!(rigid(&format!("rigid = {ground}")).is_ok());
+    assert_says(rigid(""), &["master (a surface) or rigid (an obstacle)"]);
+    assert_says(rigid(&format!("master = 'block.zmax', rigid = {ground}")), &["remove either master or rigid"]);
+    assert_says(rigid("rigid = {cone = {point = [0, 0, 0]}}"), &["cone", "plane", "sphere", "cylinder", "heightfield"]);
+    assert_says(rigid("rigid = {sphere = {centre = [0, 0, 0], diameter = 1}}"), &["diameter", "radius"]);
+    assert_says(rigid("rigid = {sphere = {centre = [0, 0, 0]}}"), &["missing key", "radius"]);
+    let text = rigid("rigid = {cylinder = {point = [0, 0, 0], axis = [1, 0, 0], radius = 2, inside = true}}").unwrap();
+    assert_eq!(Scene::from_text(&text.to_toml(), "echo", 1, &[]).unwrap(), text);
+}
+
+#[test]
+fn obstacles_are_checked() {
+    let says = |rigid: &str, parts: &[&str]| {
+        let set = format!("contact.ground={{slave = 'block.zmin', rigid = {{{rigid}}}}}");
+        refuses(&[&set], &[&["contact.ground.rigid."], parts].concat());
+    };
+    says("plane = {point = [0, nan, 0], normal = [0, 0, 1]}", &["plane.point", "finite"]);
+    says("plane = {point = [0, 0, 0], normal = [0, 0, 0]}", &["plane.normal", "point somewhere"]);
+    for radius in ["0", "-1", "inf", "nan"] {
+        says(&format!("sphere = {{centre = [0, 0, 0], radius = {radius}}}"), &["sphere.radius = ", "positive"]);
+    }
+    says("sphere = {centre = [inf, 0, 0], radius = 1}", &["sphere.centre", "finite"]);
+    says("cylinder = {point = [0, 0, 0], axis = [0, 0, 0], radius = 1}", &["cylinder.axis"]);
+    says("cylinder = {point = [0, 0, 0], axis = [0, 0, 1], radius = -1}", &["cylinder.radius"]);
+    let field = |spacing: &str, heights: &str| {
+        format!("heightfield = {{origin = [0, 0], spacing = {spacing}, heights = {heights}}}")
+    };
+    says(&field("[1, 0]", "[[0, 0], [0, 0]]"), &["heightfield.spacing = [1.0, 0.0]", "positive"]);
+    for heights in ["[]", "[[0, 0]]", "[[0], [0]]", "[[0, 0], [0, 0, 0]]"] {
+        says(&field("[1, 1]", heights), &["heightfield.heights", "equal length"]);
+    }
+    says(&field("[1, 1]", "[[0, 0], [0, nan]]"), &["heightfield.heights", "finite"]);
+}
+
+#[test]
 fn decompositions_are_checked() {
     refuses(&["decomposition.cells=[0, 2, 2]"], &["decomposition.cells = [0, 2, 2]"]);
     refuses(
@@ -342,6 +383,9 @@ fn bodies_must_be_held() {
     assert_says(Scene::from_text(ONE, "one.toml", 1, &hinge), &["against translation along y:"]);
     hinge.push("support.side={surface = 'block.ymin', fix = ['y']}".to_owned());
     assert!(Scene::from_text(ONE, "one.toml", 1, &hinge).is_ok(), "three planes of symmetry hold a body");
+    let floor = "contact.floor={slave = 'block.zmin', rigid = {plane = {point = [0, 0, 0], normal = [0, 0, 1]}}}";
+    let loose = one(&["support.base.fix=['x', 'y']", floor]).unwrap();
+    assert!(loose.warnings()[0].contains("translation along z"), "{:?}", loose.warnings());
     hinge[1] = "support.back={surface = 'block.zmax', fix = ['y']}".to_owned();
     assert_says(Scene::from_text(ONE, "one.toml", 1, &hinge), &["against translation along x:"]);
 }

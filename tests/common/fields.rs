@@ -4,6 +4,9 @@ use std::path::Path;
 
 use hdf5_metno::{Dataset, File};
 
+/// What closed forms are met to.
+pub const EXACT: f64 = 1e-10;
+
 /// All pieces of a result file, one behind the other.
 pub struct Fields {
     file: File,
@@ -39,6 +42,11 @@ impl Fields {
 
     /// A field of one real number a point.
     pub fn of_points(&self, name: &str) -> Vec<f64> {
+        self.file.dataset(&format!("VTKHDF/PointData/{name}")).unwrap().read_raw().unwrap()
+    }
+
+    /// A field of one integer a point.
+    pub fn integers_of_points(&self, name: &str) -> Vec<i64> {
         self.file.dataset(&format!("VTKHDF/PointData/{name}")).unwrap().read_raw().unwrap()
     }
 
@@ -85,5 +93,24 @@ fn bits(dataset: &Dataset) -> Vec<u64> {
         dataset.read_raw::<i64>().unwrap().into_iter().map(i64::cast_unsigned).collect()
     } else {
         dataset.read_raw::<f64>().unwrap().into_iter().map(f64::to_bits).collect()
+    }
+}
+
+/// Fails unless every value is the expected one, relative to `scale`.
+#[track_caller]
+pub fn assert_uniform(what: &str, values: impl IntoIterator<Item = f64>, expected: f64, scale: f64) {
+    let errors = values.into_iter().map(|value| ((value - expected) / scale).abs());
+    let worst = errors.fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a });
+    assert!(worst <= EXACT, "{what}: relative error {worst:.2e} against {expected}");
+}
+
+/// Fails unless every node has the displacement that `exact` gives for it.
+#[track_caller]
+pub fn assert_displacement(fields: &Fields, exact: impl Fn(usize) -> [f64; 3]) {
+    let expected: Vec<[f64; 3]> = (0..fields.points.len()).map(exact).collect();
+    let size = expected.as_flattened().iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+    for axis in 0..3 {
+        let errors = fields.displacement.iter().zip(&expected).map(|(u, exact)| u[axis] - exact[axis]);
+        assert_uniform(&format!("displacement along axis {axis}"), errors, 0.0, size);
     }
 }

@@ -73,6 +73,13 @@ pub fn solve_with(ranks: usize, scene: &str, level: usize, sets: &[&str], more: 
     scene_command("solve", ranks, scene, level, sets, &more, directory)
 }
 
+/// As [`solve`], as exactly as double precision allows; fails unless it converges.
+pub fn solve_tightly(ranks: usize, scene: &str, sets: &[&str]) -> Run {
+    const TIGHT: [&str; 3] =
+        ["solver.newton_tolerance=1e-11", "solver.residual_tolerance=1e-11", "solver.qp_tolerance=1e-13"];
+    solve(ranks, scene, &[&TIGHT[..], sets].concat()).converged()
+}
+
 /// Checks a scene without solving it.
 pub fn check(ranks: usize, scene: &str, level: usize, sets: &[&str]) -> Run {
     scene_command("check", ranks, scene, level, sets, &[], tempfile::tempdir().unwrap())
