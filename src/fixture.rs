@@ -94,6 +94,13 @@ pub fn two_meshes(parts: usize) -> Scene {
     Scene::from_text(&text, "two meshes", 1, &[]).expect("the scene is sound")
 }
 
+/// As [`two_bricks`], with meshes that do not match: all contact rows are in one block.
+pub fn not_matching(sets: &[&str]) -> Scene {
+    let cells =
+        ["body.upper.brick.cells=[4, 4, 2]", "body.lower.brick.cells=[6, 4, 2]", "decomposition.cells=[2, 2, 1]"];
+    two_bricks(&[&cells, sets].concat())
+}
+
 /// A built-in scene; `patch` has nodes with eight copies.
 pub fn built_in(name: &str, sets: &[&str]) -> Scene {
     Scene::load(name, 1, &owned(sets)).expect("the scene is sound")

@@ -9,15 +9,16 @@ use crate::assembly::loads::{self, Traction};
 use crate::bodies::{self, MeshError, Meshes};
 use crate::cascade;
 use crate::comm::{Comm, Shares, all_gather_u64, ordered_sum};
-use crate::constraint::{ConstraintError, Constraints, Kind, Support};
+use crate::constraint::{ConstraintError, Constraints, Kind, Support, dirichlet};
 use crate::contact::surface::GatheredSurface;
-use crate::contact::{ContactError, ContactPair, matching, rigid};
+use crate::contact::{ContactError, ContactPair, matching, mortar, rigid};
 use crate::decomposition::bricks::Boxes;
 use crate::decomposition::twins::twins;
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
+use crate::feti::coupling::Coupling;
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::gather::Gather;
 use crate::feti::kernel::RigidModes;
@@ -119,15 +120,6 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     drop(tets);
     let reading_mb = reading_mb(&bodies, comm);
 
-    let mut pairs = Vec::new();
-    for (number, (name, contact)) in scene.contact.iter().enumerate() {
-        let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
-        let slave = gather(contact.slave());
-        pairs.extend(match contact {
-            scene::Contact::Surfaces { master, .. } => matching::pair(number, name, &slave, &gather(master))?,
-            scene::Contact::Rigid { rigid: obstacle, .. } => rigid::pair(number, name, &slave, obstacle)?,
-        });
-    }
     let supports: Vec<Support> = scene
         .support
         .iter()
@@ -138,6 +130,25 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
             displacement: s.displacement.unwrap_or_default(),
         })
         .collect();
+    let mut pairs = Vec::new();
+    for (number, (name, contact)) in scene.contact.iter().enumerate() {
+        let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
+        let slave = gather(contact.slave());
+        pairs.extend(match contact {
+            scene::Contact::Surfaces { master, .. } => {
+                let master = gather(master);
+                match matching::pair(number, &slave, &master) {
+                    Some(pairs) if pairs.is_empty() => return Err(ContactError::Apart { name: name.clone() }.into()),
+                    Some(pairs) => pairs,
+                    None => {
+                        let held = dirichlet::held(comm, &decomposition.interface, &supports, &slave.nodes);
+                        mortar::pair(number, name, &slave, &master, &held)?
+                    }
+                }
+            }
+            scene::Contact::Rigid { rigid: obstacle, .. } => rigid::pair(number, name, &slave, obstacle)?,
+        });
+    }
     let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
     let constraints: Result<_, ConstraintError> = Constraints::new(comm, &decomposition, &supports, &pairs);
     let constraints = agree(comm, "supports", constraints).map_err(StudyError::Supports)?;
@@ -349,6 +360,7 @@ pub fn solve(
         loads,
         constraints,
         gather: &gather,
+        coupling: RefCell::new(Coupling::new(constraints)),
         space: &space,
         yields: discrete.materials.iter().any(|m| m.yield_stress.is_some()),
     };
@@ -505,8 +517,8 @@ fn contact_forces(problem: &TornProblem, discrete: &Discrete, contact: &[Contact
         let mut sums = vec![[0.0; 3]; contacts.len()];
         for &row in rows {
             if let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind {
-                let (force, ContactPair { contact, normal, .. }) = (of_pair[pair].unwrap_or_default(), &pairs[pair]);
-                (0..3).for_each(|a| sums[*contact][a] -= force * normal[a]);
+                let force = pairs[pair].force(of_pair[pair].unwrap_or_default());
+                sums[pairs[pair].contact].iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
             }
         }
         partial.extend_from_slice(sums.as_flattened());

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::contact::Side;
-use super::{ConstraintError, Constraints, Entry, Row, Support, contact, dirichlet, gluing};
+use super::{ConstraintError, Constraints, Entry, Row, Support, Term, contact, dirichlet, gluing};
 use crate::comm::{Comm, all_gather_u64};
 use crate::contact::ContactPair;
 use crate::decomposition::{Decomposition, InterfaceNode};
@@ -58,8 +58,7 @@ impl Constraints {
             let mut contacts: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
             for &number in &cluster.pairs {
                 let pair = &pairs[number];
-                let masters: Vec<Side> = pair.masters.iter().map(|(node, _)| sides[node]).collect();
-                match contact::row(number, pair, sides[&pair.slave], &masters) {
+                match contact::row(number, pair, |node| sides[&node]) {
                     Ok(row) => contact::add_tightest(contacts.entry(pair.slave).or_default(), row),
                     Err(left) => result.idle.push((number, left)),
                 }
@@ -81,7 +80,7 @@ impl Constraints {
         for mut row in rows {
             let number = self.rows.len() as u32;
             row.terms.sort_by_key(|t| (t.subdomain, t.node, t.axis));
-            for part in row.terms.chunk_by(|a, b| a.subdomain == b.subdomain) {
+            for part in row.terms.chunk_by(Term::share_slot) {
                 let slot = self.slot_subdomain.len() as u32;
                 self.slot_subdomain.push(part[0].subdomain);
                 let Some(own) = decomposition.own_index(part[0].subdomain) else { continue };
@@ -105,7 +104,7 @@ impl Constraints {
 
 /// Nodes that a pair ties together.
 fn nodes_of(pair: &ContactPair) -> impl Iterator<Item = u64> {
-    [pair.slave].into_iter().chain(pair.masters.iter().map(|(node, _)| *node))
+    contact::nodes(pair).map(|(node, _)| node)
 }
 
 /// Copies and surfaces of all nodes in contact, on every rank.
@@ -124,14 +123,17 @@ fn gather_nodes(comm: &dyn Comm, decomposition: &Decomposition, pairs: &[Contact
 /// Connected components of the nodes under the contact pairs, named by their lowest node.
 fn clusters(pairs: &[ContactPair]) -> (HashMap<u64, u64>, BTreeMap<u64, Cluster>) {
     let mut parent: HashMap<u64, u64> = HashMap::new();
-    fn root(parent: &mut HashMap<u64, u64>, node: u64) -> u64 {
-        let up = *parent.entry(node).or_insert(node);
-        if up == node {
-            return node;
+    fn root(parent: &mut HashMap<u64, u64>, mut node: u64) -> u64 {
+        loop {
+            let up = *parent.entry(node).or_insert(node);
+            if up == node {
+                return node;
+            }
+            // Halves the way for the next search.
+            let further = parent[&up];
+            parent.insert(node, further);
+            node = further;
         }
-        let top = root(parent, up);
-        parent.insert(node, top);
-        top
     }
     for pair in pairs {
         for node in nodes_of(pair) {

@@ -1,4 +1,5 @@
-//! Contact rows: `normal . (mean of the slave's copies - means of the masters') <= gap`, made a unit vector.
+//! Contact rows: `normal . (weighted means over the copies of the slave side's nodes - the master's) <= gap`, made a unit
+//! vector.
 //!
 //! Components that a support fixes leave the row and go to its right-hand side: contact rows stay orthogonal to
 //! support rows and the active rows independent. Of rows with one direction (a node that meets two obstacles alike) only
@@ -14,16 +15,22 @@ pub(super) type Side<'a> = (&'a InterfaceNode, [Option<(usize, f64)>; 3]);
 /// Cosine from which two rows have one direction.
 const PARALLEL: f64 = 1.0 - 1e-12;
 
-/// The row of a pair, with the sides of its slave and of each of its masters.
+/// Nodes of a pair and their factors in its condition.
+pub(super) fn nodes(pair: &ContactPair) -> impl Iterator<Item = (u64, f64)> {
+    let masters = pair.masters.iter().map(|(node, weight)| (*node, -weight));
+    [(pair.slave, 1.0)].into_iter().chain(pair.others.iter().copied()).chain(masters)
+}
+
+/// The row of a pair; `sides` knows its nodes.
 ///
 /// # Errors
 /// If supports fix all nodes along the normal: the distance that is left for good (length).
-pub(super) fn row(number: usize, pair: &ContactPair, slave: Side, masters: &[Side]) -> Result<Row, f64> {
+pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> Side<'a>) -> Result<Row, f64> {
     let mut rhs = pair.gap;
     let mut terms = Vec::new();
     let mut square = 0.0;
-    let others = masters.iter().zip(&pair.masters).map(|(side, (_, weight))| (*side, -weight));
-    for ((node, fixed), factor) in [(slave, 1.0)].into_iter().chain(others) {
+    for (node, factor) in nodes(pair) {
+        let (node, fixed) = sides(node);
         let weight = factor / node.copies.len() as f64;
         for (axis, (component, held)) in pair.normal.into_iter().zip(fixed).enumerate() {
             match held {

@@ -9,6 +9,22 @@ pub(super) fn fixed(node: &InterfaceNode, supports: &[Support]) -> [Option<(usiz
     [0, 1, 2].map(|axis| at(node, supports, axis).next())
 }
 
+/// Which components supports fix at some nodes, ascending and all on named surfaces. Collective: the nodes are the same on
+/// every rank.
+pub fn held(comm: &dyn Comm, interface: &[InterfaceNode], supports: &[Support], nodes: &[u64]) -> Vec<[bool; 3]> {
+    let mut mine = Vec::new();
+    for node in interface.iter().filter(|node| nodes.binary_search(&node.node).is_ok()) {
+        let fixed = fixed(node, supports).map(|support| u64::from(support.is_some()));
+        mine.extend([node.node, fixed[0], fixed[1], fixed[2]]);
+    }
+    let mut held = vec![[false; 3]; nodes.len()];
+    for report in all_gather_u64(comm, &mine).chunks_exact(4) {
+        let at = nodes.binary_search(&report[0]).expect("it is one of the nodes");
+        held[at] = std::array::from_fn(|a| report[1 + a] == 1);
+    }
+    held
+}
+
 /// The supports that fix a component at a node, and their values.
 fn at(node: &InterfaceNode, supports: &[Support], axis: usize) -> impl Iterator<Item = (usize, f64)> {
     let holds = move |s: &Support| s.fixed[axis] && node.surfaces.contains(&(s.surface as u32));

@@ -1,4 +1,5 @@
-//! The rows of B: gluing of copies, supports and contact, orthonormal (`B B' = I` where a node meets one contact).
+//! The rows of B: gluing of copies, supports and contact, unit vectors. All are orthogonal but for contact rows that share
+//! nodes, where a node is in several contacts or meshes do not match.
 //!
 //! Rows that share a node form a *block*: the gluing and support rows of a node, together with those of the nodes
 //! that contact ties to it. A rank holds every row of every block that one of its subdomains touches, so whatever
@@ -62,6 +63,13 @@ pub struct Row {
     pub terms: Vec<Term>,
 }
 
+impl Term {
+    /// Whether both belong to one copy of a node, in one row.
+    pub fn share_slot(&self, other: &Self) -> bool {
+        (self.subdomain, self.node) == (other.subdomain, other.node)
+    }
+}
+
 impl Row {
     /// Whether the multiplier is bounded below by zero.
     pub fn is_inequality(&self) -> bool {
@@ -87,7 +95,7 @@ pub struct Support {
 pub struct Entry {
     /// Row on this rank.
     pub row: u32,
-    /// Which of the row's slots collects this subdomain's contribution.
+    /// Which of the row's slots collects this node's contribution.
     pub slot: u32,
     /// Local unknown, `3 node + axis`.
     pub dof: u32,
@@ -97,13 +105,13 @@ pub struct Entry {
 
 /// The rows that one rank holds.
 pub struct Constraints {
-    /// Rows, block by block in the order of the blocks' lowest nodes. Terms are sorted by subdomain: one slot each.
+    /// Rows, block by block in the order of the blocks' lowest nodes. Terms are sorted by subdomain and node: one slot each.
     pub rows: Vec<Row>,
     /// Rows of each block.
     pub blocks: Vec<Range<usize>>,
     /// Subdomains of each block, ascending.
     pub block_subdomains: Vec<Vec<u32>>,
-    /// First slot of each row, and the end. A slot is one subdomain's part in a row.
+    /// First slot of each row, and the end. A slot is the part of one copy of a node in a row.
     pub slot_begin: Vec<u32>,
     /// Subdomain of each slot; ascending within a row.
     pub slot_subdomain: Vec<u32>,

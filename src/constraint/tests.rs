@@ -55,13 +55,13 @@ fn a_common_motion_leaves_gluing_at_rest_and_is_seen_by_supports_and_contact() {
                         (row.terms.len() as f64).sqrt() * motion(point(setup, row.terms[0].node))[axis]
                     }
                     Kind::Contact { pair } => {
-                        let ContactPair { slave, ref masters, normal, .. } = setup.discrete.pairs[pair];
+                        let pair = &setup.discrete.pairs[pair];
                         let part = |node: u64, axis: usize| {
                             let free = row.terms.iter().any(|t| (t.node, t.axis) == (node, axis));
-                            if free { normal[axis] * motion(point(setup, node))[axis] } else { 0.0 }
+                            if free { pair.normal[axis] * motion(point(setup, node))[axis] } else { 0.0 }
                         };
-                        let mean = |a: usize| masters.iter().map(|(node, w)| w * part(*node, a)).sum::<f64>();
-                        row.scale * (0..3).map(|a| part(slave, a) - mean(a)).sum::<f64>()
+                        let sides = |a: usize| contact::nodes(pair).map(|(node, w)| w * part(node, a)).sum::<f64>();
+                        row.scale * (0..3).map(sides).sum::<f64>()
                     }
                 };
                 assert!((found - expected).abs() < 1e-14 * size, "{row:?}");
@@ -130,8 +130,9 @@ fn node(node: u64, copies: &[u32]) -> InterfaceNode {
     InterfaceNode { node, copies: copies.to_vec(), surfaces: vec![] }
 }
 
-fn pair(masters: &[(u64, f64)]) -> ContactPair {
-    ContactPair { contact: 0, slave: 7, masters: masters.to_vec(), normal: [0.6, 0.0, 0.8], gap: 0.5, area: 1.0 }
+fn pair(others: &[(u64, f64)], masters: &[(u64, f64)]) -> ContactPair {
+    let (others, masters) = (others.to_vec(), masters.to_vec());
+    ContactPair { contact: 0, slave: 7, others, masters, normal: [0.6, 0.0, 0.8], gap: 0.5, area: 1.0 }
 }
 
 /// Sum of a row's coefficients at a node, as before it was made a unit vector.
@@ -141,21 +142,27 @@ fn coefficient(row: &Row, node: u64, axis: usize) -> f64 {
 
 #[test]
 fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_hand_side() {
-    let pair = pair(&[(8, 0.25), (9, 0.75)]);
-    let [slave, left, right] = [node(7, &[0, 3]), node(8, &[1, 2, 4]), node(9, &[2])];
+    let pair = pair(&[(6, 0.5)], &[(8, 0.75), (9, 0.75)]);
+    let nodes = [node(6, &[3]), node(7, &[0, 3]), node(8, &[1, 2, 4]), node(9, &[2])];
     let (held, free) = ([Some((0, 0.25)), None, None], [None; 3]);
-    let row = contact::row(3, &pair, (&slave, held), &[(&left, free), (&right, held)]).expect("much is free");
+    let side = |number: u64, fixed: [Option<(usize, f64)>; 3]| (&nodes[number as usize - 6], fixed);
+    let row = contact::row(3, &pair, |n| side(n, if n % 2 == 1 { held } else { free })).expect("much is free");
     let square: f64 = row.terms.iter().map(|t| t.value * t.value).sum();
     assert!((square - 1.0).abs() < 1e-15);
     assert!((row.rhs - row.scale * (0.5 - 0.6 * 0.25 + 0.75 * 0.6 * 0.25)).abs() < 1e-15);
-    let expected = [(7, [0.0, 0.0, 0.8]), (8, [-0.25 * 0.6, 0.0, -0.25 * 0.8]), (9, [0.0, 0.0, -0.75 * 0.8])];
+    let expected = [
+        (6, [0.5 * 0.6, 0.0, 0.5 * 0.8]),
+        (7, [0.0, 0.0, 0.8]),
+        (8, [-0.75 * 0.6, 0.0, -0.75 * 0.8]),
+        (9, [0.0, 0.0, -0.75 * 0.8]),
+    ];
     for (node, expected) in expected {
         for (axis, expected) in expected.into_iter().enumerate() {
             assert!((coefficient(&row, node, axis) - expected).abs() < 1e-15, "{node} {axis}");
         }
     }
     let all = [Some((0, 0.1)); 3];
-    let left = contact::row(3, &pair, (&slave, all), &[(&left, all), (&right, all)]).unwrap_err();
+    let left = contact::row(3, &pair, |n| side(n, all)).unwrap_err();
     assert!((left - 0.5).abs() < 1e-15, "a common motion leaves the gap: {left}");
 }
 
@@ -163,7 +170,8 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
 fn of_contacts_in_one_direction_the_tightest_counts() {
     let slave = node(7, &[0, 3]);
     let row = |number: usize, gap: f64, normal: [f64; 3]| {
-        contact::row(number, &ContactPair { gap, normal, ..pair(&[]) }, (&slave, [None; 3]), &[]).expect("it is free")
+        let pair = ContactPair { gap, normal, ..pair(&[], &[]) };
+        contact::row(number, &pair, |_| (&slave, [None; 3])).expect("it is free")
     };
     let (up, down) = ([0.6, 0.0, 0.8], [-0.6, 0.0, -0.8]);
     let mut rows = Vec::new();

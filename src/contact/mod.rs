@@ -1,49 +1,61 @@
 //! Contact geometry: which points of two surfaces face each other, normals and gaps. No unknowns, no multipliers.
 //!
-//! Every condition is one on a slave node: against a weighted mean of master nodes ([`matching`]: of one), or against a rigid
-//! obstacle ([`rigid`]). Surfaces are two-dimensional, so every rank sees both sides of each contact whole,
+//! Every condition is one on a slave node: against the master node opposite where meshes match ([`matching`]), against
+//! weighted means of master nodes where they do not ([`mortar`]), or against a rigid obstacle ([`rigid`]). Surfaces are two-dimensional, so every rank sees both sides of each contact whole,
 //! for the time of the pairing only; what is kept of it are the pairs.
 
+pub mod clip;
+pub mod dual;
 pub mod matching;
+pub mod mortar;
 pub mod rigid;
 pub mod surface;
+pub mod tree;
 
 use thiserror::Error;
 
 /// A node of the slave surface and what it meets: linearised frictionless contact
-/// `normal . (u_slave - sum of weight u_master) <= gap`.
+/// `normal . (u_slave + sum of weight u_other - sum of weight u_master) <= gap`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactPair {
     /// Index of the contact in the scene.
     pub contact: usize,
     /// Global node on the slave surface.
     pub slave: u64,
-    /// Global nodes on the master surface with their weights, which add up to one; none on a rigid obstacle.
+    /// Other nodes of the slave surface that move with it: some that supports hold; usually none.
+    pub others: Vec<(u64, f64)>,
+    /// Global nodes on the master surface with their weights, which add up to those of the slave side; none on a rigid
+    /// obstacle.
     pub masters: Vec<(u64, f64)>,
     /// Unit vector towards the other side. Between surfaces: the outward normal of the slave surface at the node, mean of
     /// the adjacent triangles' area vectors. At a rigid obstacle: straight into it.
     pub normal: [f64; 3],
     /// Initial distance along the normal (length); negative where the bodies overlap.
     pub gap: f64,
-    /// Share of the slave surface that belongs to the node: a third of the adjacent triangles (area).
+    /// Share of the slave surface that belongs to the node: pressure is force on the condition over this area. A third of the
+    /// adjacent triangles; of their part that faces the master surface where meshes do not match.
     pub area: f64,
+}
+
+impl ContactPair {
+    /// Force on the slave surface where the condition is met with this force: the master's nodes take all of it.
+    pub fn force(&self, force: f64) -> [f64; 3] {
+        let others: f64 = self.others.iter().map(|(_, weight)| weight).sum();
+        self.normal.map(|n| -(1.0 + others) * force * n)
+    }
 }
 
 /// Why two surfaces cannot be paired.
 #[derive(Debug, Error, PartialEq)]
 pub enum ContactError {
-    /// The slave surface meets the master surface at places that are not its nodes.
+    /// Supports hold every slave node that faces the master.
     #[error(
-        "contact.{name}: {unmatched} of {slaves} nodes of the slave surface meet the master surface between its nodes; \
-         make the two meshes match there (same node positions on both sides)"
+        "contact.{name}: supports hold all nodes of the slave surface in the direction of the contact; swap slave and master, \
+         or leave that direction free"
     )]
-    NotMatching {
+    AllHeld {
         /// Name of the contact in the scene.
         name: String,
-        /// Slave nodes over the master surface without a master node opposite.
-        unmatched: usize,
-        /// All slave nodes.
-        slaves: usize,
     },
     /// The surfaces do not face each other anywhere.
     #[error(

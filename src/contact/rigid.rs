@@ -35,7 +35,7 @@ pub fn pair(
     let pairs: Vec<_> = nodes
         .filter_map(|((&slave, &point), (outward, area))| {
             let (normal, gap) = approach(obstacle, point, outward)?;
-            let pair = ContactPair { contact, slave, masters: Vec::new(), normal, gap, area };
+            let pair = ContactPair { contact, slave, others: Vec::new(), masters: Vec::new(), normal, gap, area };
             (dot(normal, outward) > FACING).then_some(pair)
         })
         .collect();

@@ -38,9 +38,27 @@ impl GatheredSurface {
         Self { nodes, points, triangles }
     }
 
+    /// Corners of the triangles.
+    pub fn corners(&self) -> impl Iterator<Item = [[f64; 3]; 3]> {
+        self.triangles.iter().map(|triangle| triangle.map(|corner| self.points[corner]))
+    }
+
     /// Area vectors of the triangles.
     fn area_vectors(&self) -> impl Iterator<Item = [f64; 3]> {
-        self.triangles.iter().map(|triangle| area_vector(&triangle.map(|corner| self.points[corner])))
+        self.corners().map(|corners| area_vector(&corners))
+    }
+
+    /// Diagonal of the bounding box.
+    pub fn diameter(&self) -> f64 {
+        let along = |a: usize| {
+            let (low, high) = self
+                .points
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| (low.min(point[a]), high.max(point[a])));
+            high - low
+        };
+        let diagonal = [0, 1, 2].map(along);
+        dot(diagonal, diagonal).sqrt()
     }
 
     /// Unit normal and share of the area (a third of the adjacent triangles) of each node.

@@ -92,11 +92,19 @@ impl Analysis {
     pub fn ordered(lower: Lower, order: &[u32]) -> Self {
         let mut inverse = vec![0; order.len()];
         order.iter().enumerate().for_each(|(place, &unknown)| inverse[unknown as usize] = place as u32);
+        Self::new(lower, SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len())))
+    }
+
+    /// In an approximate minimum degree order.
+    pub fn minimum_degree(lower: Lower) -> Self {
+        Self::new(lower, SymmetricOrdering::Amd)
+    }
+
+    fn new(lower: Lower, ordering: SymmetricOrdering<u32>) -> Self {
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let ordering = SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len()));
         let symbolic = factorize_symbolic_cholesky(lower.pattern(), Side::Lower, ordering, params);
         Self(symbolic.expect("a factor fits in memory and its index type"))
     }

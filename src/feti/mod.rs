@@ -5,9 +5,11 @@
 
 pub mod cholesky;
 pub mod coarse;
+pub mod coupling;
 pub mod face;
 pub mod factor;
 pub mod gather;
+pub mod gram;
 pub mod kernel;
 pub mod operator;
 pub mod ordering;

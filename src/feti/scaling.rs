@@ -1,13 +1,17 @@
 //! Stiffness scaling of the constraint rows: `B_D = (B D^-1 B')^-1 B D^-1` with `D` the diagonal of the stiffness.
 //!
 //! `B D^-1 B'` is block diagonal over the blocks of rows, so unequal stiffness on both sides of an interface, or of a
-//! contact, is weighted exactly (Rixen and Farhat 1999; Klawonn, Rheinbach 2007 in matrix form). The inverses of the
-//! blocks are kept dense.
+//! contact, is weighted exactly (Rixen and Farhat 1999; Klawonn, Rheinbach 2007 in matrix form). Inverses of small blocks
+//! are kept dense, of large ones (contact of meshes that do not match) as sparse factors.
 
 use std::ops::Range;
 
 use super::gather::Gather;
+use super::gram::{Gram, coefficients};
 use crate::constraint::Constraints;
+
+/// Most rows of a small block.
+const SMALL: usize = 64;
 
 /// `D^-1` of own subdomains and the inverses of the blocks of `B D^-1 B'`.
 #[derive(Default)]
@@ -16,9 +20,11 @@ pub struct Scaling {
     pub flexibility: Vec<Vec<f64>>,
     /// The three components' flexibility at the node of each slot.
     of_slot: Vec<[f64; 3]>,
+    /// Rows of the small blocks.
     blocks: Vec<Range<usize>>,
-    /// Inverses of the blocks, row by row, one behind the other.
+    /// Inverses of the small blocks, row by row, one behind the other.
     inverses: Vec<f64>,
+    large: Vec<Gram>,
 }
 
 impl Scaling {
@@ -41,11 +47,18 @@ impl Scaling {
                 }
             },
         );
+        let (small, large): (Vec<_>, Vec<_>) = constraints.blocks.iter().cloned().partition(|rows| rows.len() <= SMALL);
         let mut inverses = Vec::new();
-        for rows in &constraints.blocks {
+        for rows in &small {
             inverses.extend(invert(block_matrix(constraints, rows.clone(), &of_slot, |_| true), rows.len()));
         }
-        Self { flexibility, of_slot, blocks: constraints.blocks.clone(), inverses }
+        let factor = |rows: Range<usize>| {
+            let mut gram = Gram::new(constraints, rows.collect());
+            gram.factorise(|slot, axis| of_slot[slot][axis], |_| true);
+            gram
+        };
+        let large = large.into_iter().map(factor).collect();
+        Self { flexibility, of_slot, blocks: small, inverses, large }
     }
 
     /// From now on only the kept rows count, the others get zero. Only rows of inequalities may come and go. Local.
@@ -59,10 +72,14 @@ impl Scaling {
             }
             at = end;
         }
+        // Only contact makes them large.
+        for gram in &mut self.large {
+            gram.factorise(|slot, axis| self.of_slot[slot][axis], &kept);
+        }
     }
 
     /// `y = (B D^-1 B')^-1 x`. Local.
-    pub fn solve(&self, x: &[f64], y: &mut [f64]) {
+    pub fn solve(&mut self, x: &[f64], y: &mut [f64]) {
         let mut at = 0;
         for rows in &self.blocks {
             let (x, n) = (&x[rows.clone()], rows.len());
@@ -71,6 +88,7 @@ impl Scaling {
             }
             at += n * n;
         }
+        self.large.iter_mut().for_each(|gram| gram.solve(x, y));
     }
 }
 
@@ -82,22 +100,14 @@ fn block_matrix(
     kept: impl Fn(usize) -> bool,
 ) -> Vec<f64> {
     let n = rows.len();
-    let mut terms = Vec::new();
-    for row in rows.clone().filter(|&row| kept(row)) {
-        let mut slot = constraints.slots(row).start;
-        let all = &constraints.rows[row].terms;
-        for (k, term) in all.iter().enumerate() {
-            slot += usize::from(k > 0 && all[k - 1].subdomain != term.subdomain);
-            let key = (term.subdomain, term.node, term.axis);
-            terms.push((key, row - rows.start, term.value, of_slot[slot][term.axis]));
-        }
-    }
-    terms.sort_by_key(|t| (t.0, t.1));
+    let kept = rows.clone().filter(|&row| kept(row)).map(|row| (row - rows.start, row));
+    let coefficients = coefficients(constraints, kept);
     let mut matrix = vec![0.0; n * n];
-    for same in terms.chunk_by(|a, b| a.0 == b.0) {
+    for same in coefficients.chunk_by(|a, b| a.unknown() == b.unknown()) {
         for a in same {
             for b in same {
-                matrix[n * a.1 + b.1] += a.2 * b.2 * a.3;
+                let flexibility = of_slot[a.slot][a.term.axis];
+                matrix[n * a.place + b.place] += a.term.value * b.term.value * flexibility;
             }
         }
     }

@@ -1,9 +1,12 @@
 //! The torn nonlinear problem: `J`, `F(u)`, and the admissible set.
 
+use std::cell::RefCell;
+
 use crate::assembly::internal::{self, Terms};
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
+use crate::feti::coupling::Coupling;
 use crate::feti::gather::Gather;
 use crate::feti::kernel::RigidModes;
 use crate::feti::space::RowSpace;
@@ -23,6 +26,8 @@ pub struct TornProblem<'a> {
     pub constraints: &'a Constraints,
     /// B.
     pub gather: &'a Gather<'a>,
+    /// Contact rows that are not orthogonal.
+    pub coupling: RefCell<Coupling>,
     /// Inner products and sums.
     pub space: &'a RowSpace<'a>,
     /// Whether any material of the scene yields.
@@ -125,25 +130,26 @@ impl TornProblem<'_> {
     }
 
     /// The part of the slack that violates its constraint.
-    fn violation(&self, u: &Torn) -> Vec<f64> {
-        let mut violation = self.slack(u);
-        for (v, row) in violation.iter_mut().zip(&self.constraints.rows) {
+    fn violated(&self, mut slack: Vec<f64>) -> Vec<f64> {
+        for (s, row) in slack.iter_mut().zip(&self.constraints.rows) {
             if row.is_inequality() {
-                *v = v.min(0.0);
+                *s = s.min(0.0);
             }
         }
-        violation
+        slack
     }
 
-    /// The nearest admissible displacement: rows are orthonormal, so one correction by `B'` is the projection.
+    /// Corrects a displacement by `B'` until it is admissible. Where rows are orthonormal that is the projection.
     pub fn make_admissible(&self, u: &mut Torn) {
-        let violation = self.violation(u);
-        self.gather.add_transpose(1.0, &violation, u);
+        let slack = self.slack(u);
+        let mut correction = self.violated(slack.clone());
+        self.coupling.borrow_mut().close(&slack, &mut correction);
+        self.gather.add_transpose(1.0, &correction, u);
     }
 
     /// Whether a displacement satisfies all constraints to round-off.
     pub fn is_admissible(&self, u: &Torn) -> bool {
-        let violation = self.violation(u);
+        let violation = self.violated(self.slack(u));
         let rhs: Vec<f64> = self.constraints.rows.iter().map(|row| row.rhs).collect();
         let squares = self.space.dots(&[(&violation, &violation), (&rhs, &rhs)]);
         squares[0] <= f64::EPSILON * squares[1]

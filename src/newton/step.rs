@@ -73,11 +73,12 @@ impl<'a> StepSolver<'a> {
         Self { operator, projector, preconditioner, programs, twins, tangents, yielding, drift, assembled }
     }
 
-    /// Starts from the multipliers that a displacement and the rows that hold there suggest; returns them. `B B' = I`, so
-    /// they are `B (f - F(u))` on these rows. Collective.
+    /// Starts from the multipliers that a displacement and the rows that hold there suggest; returns them. They are
+    /// `(B B')^-1 B (f - F(u))` on these rows. Collective.
     pub fn expect(&mut self, problem: &TornProblem, state: &State, held: Vec<bool>) -> Vec<f64> {
         let mut lambda = vec![0.0; held.len()];
         problem.gather.apply(&problem.unbalance(state), &mut lambda);
+        problem.coupling.borrow_mut().solve(&mut lambda, |row| held[row]);
         for ((l, row), &held) in lambda.iter_mut().zip(&problem.constraints.rows).zip(&held) {
             *l = if !held {
                 0.0

@@ -9,13 +9,14 @@ use crate::feti::operator::DualOperator;
 use crate::feti::scaling::Scaling;
 use crate::feti::schur::Schur;
 use crate::fixture::{
-    Setup, assert_close, block_diagonal, built_in, column, dense, on_ranks, same_on_any_ranks, two_bricks,
-    two_bricks_by_metis,
+    Setup, assert_close, block_diagonal, built_in, column, dense, not_matching, on_ranks, same_on_any_ranks,
+    two_bricks, two_bricks_by_metis,
 };
 use crate::scene::Scene;
 
-fn scenes() -> [Scene; 3] {
-    [two_bricks(&[]), two_bricks_by_metis(7), two_bricks(&["decomposition.cells=[1, 2, 2]"])]
+fn scenes() -> [Scene; 4] {
+    let small = two_bricks(&["decomposition.cells=[1, 2, 2]"]);
+    [two_bricks(&[]), two_bricks_by_metis(7), small, not_matching(&[])]
 }
 
 /// A preconditioner at the elastic stiffness, and what it stands on.
@@ -120,8 +121,8 @@ fn lumped_and_dirichlet_equal_their_dense_formulas_with_all_rows_and_with_some()
 fn scaled_rows_are_dual_to_the_rows() {
     for scene in [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[])] {
         on_ranks(&scene, 3, |setup| {
-            let case = Case::new(setup, false, |_| true);
-            let scaling = &case.preconditioner.scaling;
+            let mut case = Case::new(setup, false, |_| true);
+            let scaling = &mut case.preconditioner.scaling;
             let x = setup.multipliers(9);
             let mut solved = vec![0.0; x.len()];
             scaling.solve(&x, &mut solved);

@@ -1,0 +1,163 @@
+use std::f64::consts::PI;
+
+use super::*;
+
+/// A surface over a grid: corners of `n` x `m` cells, each two triangles; `at` maps the unit square. Counter-clockwise in
+/// the square, seen from outside, unless `turned`.
+fn grid([n, m]: [usize; 2], first: u64, turned: bool, at: impl Fn(f64, f64) -> [f64; 3]) -> GatheredSurface {
+    let node = |i: usize, j: usize| i + (n + 1) * j;
+    let mut triangles = Vec::new();
+    for (i, j) in (0..n * m).map(|k| (k % n, k / n)) {
+        let quad = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+        let split = if (i + j) % 2 == 0 { [[0, 1, 2], [0, 2, 3]] } else { [[0, 1, 3], [1, 2, 3]] };
+        for [a, b, c] in split.map(|t| t.map(|k| quad[k])) {
+            triangles.push(if turned { [a, c, b] } else { [a, b, c] });
+        }
+    }
+    let count = (n + 1) * (m + 1);
+    let points = (0..count).map(|k| at((k % (n + 1)) as f64 / n as f64, (k / (n + 1)) as f64 / m as f64)).collect();
+    GatheredSurface { nodes: (0..count as u64).map(|k| first + k).collect(), points, triangles }
+}
+
+const FREE: [bool; 3] = [false; 3];
+
+/// The slave's face of a body above, at height `z`, and a larger master below; the meshes have nothing in common.
+fn flat(z: f64) -> (GatheredSurface, GatheredSurface) {
+    let slave = grid([4, 3], 100, true, |x, y| [0.13 + x + 0.2 * y * x, 0.21 + y, z]);
+    let master = grid([7, 6], 500, false, |x, y| [-0.3 + 2.0 * x, 2.0 * y + 0.1 * x, 0.0]);
+    (slave, master)
+}
+
+fn sum(weights: &[(u64, f64)]) -> f64 {
+    weights.iter().map(|(_, weight)| weight).sum()
+}
+
+/// A linear function of the place, interpolated.
+fn mean(weights: &[(u64, f64)], surface: &GatheredSurface, of: impl Fn([f64; 3]) -> f64) -> f64 {
+    weights.iter().map(|(node, weight)| weight * of(surface.points[(node - surface.nodes[0]) as usize])).sum()
+}
+
+/// Nodal forces of a unit pressure on a surface, by node.
+fn unit_forces(surface: &GatheredSurface) -> Vec<f64> {
+    surface.normals_and_areas().into_iter().map(|(_, area)| area).collect()
+}
+
+#[test]
+fn flat_surfaces_have_the_exact_gap_and_reproduce_linear_functions() {
+    for gap in [0.0, 0.4, -0.05] {
+        let (slave, master) = flat(gap);
+        let pairs = pair(3, "joint", &slave, &master, &vec![FREE; slave.nodes.len()]).expect("they face each other");
+        assert_eq!(pairs.iter().map(|p| p.slave).collect::<Vec<_>>(), slave.nodes);
+        let linear = |[x, y, _]: [f64; 3]| 1.0 + 2.0 * x - 3.0 * y;
+        for p in &pairs {
+            assert!((p.gap - gap).abs() < 1e-13 && (sum(&p.masters) - 1.0).abs() < 1e-13 && p.others.is_empty());
+            assert_eq!((p.contact, p.normal), (3, [0.0, 0.0, -1.0]));
+            let here = linear(slave.points[(p.slave - 100) as usize]);
+            assert!((mean(&p.masters, &master, linear) - here).abs() < 1e-12);
+        }
+    }
+}
+
+/// What a unit pressure on all conditions does to the nodes of both sides.
+fn forces(pairs: &[ContactPair], slave: &GatheredSurface, master: &GatheredSurface) -> (Vec<f64>, Vec<f64>) {
+    let mut on_slave = vec![0.0; slave.nodes.len()];
+    let mut on_master = vec![0.0; master.nodes.len()];
+    for p in pairs {
+        on_slave[(p.slave - slave.nodes[0]) as usize] += p.area;
+        p.others.iter().for_each(|(k, weight)| on_slave[(k - slave.nodes[0]) as usize] += weight * p.area);
+        p.masters.iter().for_each(|(l, weight)| on_master[(l - master.nodes[0]) as usize] += weight * p.area);
+        let force = p.force(p.area);
+        assert!((force[2] - sum(&p.masters) * p.area).abs() < 1e-14);
+    }
+    (on_slave, on_master)
+}
+
+/// Fails unless a constant pressure on some slave nodes acts on all nodes as on the covered part of either surface.
+fn assert_patch(slave: &GatheredSurface, master: &GatheredSurface, held: &[[bool; 3]], whole: bool) {
+    let pairs = pair(0, "joint", slave, master, held).expect("they face each other");
+    let (on_slave, on_master) = forces(&pairs, slave, master);
+    if whole {
+        for (found, expected) in on_slave.iter().zip(unit_forces(slave)) {
+            assert!((found - expected).abs() < 1e-13, "{found} {expected}");
+        }
+    }
+    // Equal resultants and moments.
+    for of in [|_: [f64; 3]| 1.0, |p: [f64; 3]| p[0], |p: [f64; 3]| p[1]] {
+        let resultant = |forces: &[f64], surface: &GatheredSurface| {
+            forces.iter().zip(&surface.points).map(|(f, p)| f * of(*p)).sum::<f64>()
+        };
+        assert!((resultant(&on_slave, slave) - resultant(&on_master, master)).abs() < 1e-13);
+    }
+}
+
+#[test]
+fn a_constant_pressure_acts_on_both_sides_as_it_should() {
+    let (slave, master) = flat(0.1);
+    assert_patch(&slave, &master, &vec![FREE; slave.nodes.len()], true);
+    // The larger surface as the slave: its nodes beyond the edge of the master carry nothing.
+    let mut turned = (slave, master);
+    for surface in [&mut turned.0, &mut turned.1] {
+        surface.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    }
+    let (master, slave) = turned;
+    let free = vec![FREE; slave.nodes.len()];
+    assert_patch(&slave, &master, &free, false);
+    let pairs = pair(0, "joint", &slave, &master, &free).expect("they face each other");
+    assert!(pairs.len() < slave.nodes.len());
+    // All of the master is covered.
+    let (_, on_master) = forces(&pairs, &slave, &master);
+    for (found, expected) in on_master.iter().zip(unit_forces(&master)) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+}
+
+#[test]
+fn held_nodes_carry_no_condition_but_their_share_of_the_pressure() {
+    let (slave, master) = flat(0.0);
+    // An edge held along the normal, and one held across it, which does not matter.
+    let held: Vec<[bool; 3]> =
+        (0..slave.nodes.len()).map(|k| if k % 5 == 0 { [true; 3] } else { [k % 5 == 4, true, false] }).collect();
+    assert_patch(&slave, &master, &held, true);
+    let pairs = pair(0, "joint", &slave, &master, &held).expect("most is free");
+    assert_eq!(pairs.len(), 16);
+    assert!(pairs.iter().all(|p| (p.slave - 100) % 5 > 0));
+    for p in &pairs {
+        assert!((1.0 + sum(&p.others) - sum(&p.masters)).abs() < 1e-13 && p.gap.abs() < 1e-13);
+    }
+    let all = pair(0, "joint", &slave, &master, &vec![[true; 3]; slave.nodes.len()]);
+    assert_eq!(all, Err(ContactError::AllHeld { name: "joint".into() }));
+}
+
+#[test]
+fn surfaces_apart_or_turned_away_are_no_contact() {
+    let (slave, mut master) = flat(0.0);
+    let free = vec![FREE; slave.nodes.len()];
+    let apart = Err(ContactError::Apart { name: "joint".into() });
+    master.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    assert_eq!(pair(0, "joint", &slave, &master, &free), apart);
+    let (_, mut master) = flat(0.0);
+    master.points.iter_mut().for_each(|p| p[0] += 10.0);
+    assert_eq!(pair(0, "joint", &slave, &master, &free), apart);
+    // The far side of a thick body is no overlap.
+    let (slave, master) = flat(-1.0);
+    assert_eq!(pair(0, "joint", &slave, &master, &free), apart);
+}
+
+/// Concentric quarter cylinders: the gap is the difference of the radii but for the facets, whose error falls with the
+/// square of their width.
+#[test]
+fn on_curved_surfaces_the_gap_converges_with_the_square_of_the_facets() {
+    let worst = |n: usize| {
+        let arc = |radius: f64| move |x: f64, y: f64| [radius * (0.5 * PI * x).sin(), radius * (0.5 * PI * x).cos(), y];
+        // Outward is away from the axis on the inner body, towards it on the outer.
+        let slave = grid([2 * n, n], 0, true, arc(1.0));
+        let master = grid([3 * n, n + 1], 1000, false, arc(1.1));
+        let pairs = pair(0, "joint", &slave, &master, &vec![FREE; slave.nodes.len()]).expect("they face each other");
+        assert_eq!(pairs.len(), slave.nodes.len());
+        let area: f64 = pairs.iter().map(|p| p.area).sum();
+        assert!((area - 0.5 * PI).abs() < 0.5 / (n * n) as f64, "{area}");
+        pairs.iter().map(|p| (p.gap - 0.1).abs()).fold(0.0, f64::max)
+    };
+    let errors = [2, 4, 8].map(worst);
+    assert!(errors[2] < 2e-3 && errors.windows(2).all(|e| e[1] < 0.3 * e[0]), "{errors:?}");
+}

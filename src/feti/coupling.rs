@@ -1,0 +1,92 @@
+//! Rows that are not orthogonal to each other: contact rows that share nodes. All other rows are orthonormal.
+
+use super::gram::Gram;
+use crate::constraint::Constraints;
+
+/// `B B'` of the contact rows of each block where it is not the identity.
+pub struct Coupling(Vec<Gram>);
+
+/// Share of the deepest overlap that is round-off.
+const ROUNDING: f64 = 1e-12;
+
+impl Coupling {
+    /// Of the rows of this rank.
+    pub fn new(constraints: &Constraints) -> Self {
+        let contacts = |rows: &std::ops::Range<usize>| -> Vec<usize> {
+            rows.clone().filter(|&row| constraints.rows[row].is_inequality()).collect()
+        };
+        let several = constraints.blocks.iter().map(contacts).filter(|rows| rows.len() > 1);
+        Self(several.map(|rows| Gram::new(constraints, rows)).filter(Gram::is_coupled).collect())
+    }
+
+    /// `rows = (B B')^-1 rows` with the kept rows of `B`; the others get zero where rows are coupled. Local.
+    pub fn solve(&mut self, rows: &mut [f64], kept: impl Fn(usize) -> bool) {
+        for gram in &mut self.0 {
+            gram.factorise(|_, _| 1.0, &kept);
+            let x = rows.to_vec();
+            gram.solve(&x, rows);
+        }
+    }
+
+    /// From the slack `c - B u` of all rows to multipliers `x` such that `u + B'x` satisfies the coupled rows. Others of `x`
+    /// stay as they are. Local.
+    ///
+    /// Rows that are violated are closed; where that violates others these are closed too.
+    pub fn close(&mut self, slack: &[f64], x: &mut [f64]) {
+        for gram in &mut self.0 {
+            let rows = gram.rows().to_vec();
+            let deepest = rows.iter().fold(0.0_f64, |deepest, &row| deepest.max(-slack[row]));
+            let mut closed: Vec<bool> = rows.iter().map(|&row| slack[row] < 0.0).collect();
+            rows.iter().for_each(|&row| x[row] = 0.0);
+            while closed.contains(&true) {
+                let is_closed = |row: usize| closed[rows.binary_search(&row).expect("of this block")];
+                gram.factorise(|_, _| 1.0, is_closed);
+                gram.solve(slack, x);
+                let mut left: Vec<f64> = rows.iter().map(|&row| slack[row]).collect();
+                gram.subtract_product(x, &mut left);
+                let mut grown = false;
+                for (closed, left) in closed.iter_mut().zip(left) {
+                    let joins = !*closed && left < -ROUNDING * deepest;
+                    *closed |= joins;
+                    grown |= joins;
+                }
+                if !grown {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Setup, not_matching, on_ranks, same_on_any_ranks, two_bricks};
+
+    #[test]
+    fn orthonormal_rows_are_not_coupled() {
+        on_ranks(&two_bricks(&[]), 2, |setup| assert!(Coupling::new(&setup.discrete.constraints).0.is_empty()));
+    }
+
+    #[test]
+    fn closing_leaves_no_coupled_row_violated_and_is_the_same_on_any_ranks() {
+        let close = |setup: &Setup| {
+            let mut coupling = Coupling::new(&setup.discrete.constraints);
+            // Many rows are violated, others nearly.
+            let slack: Vec<f64> = setup.multipliers(3).iter().map(|&s| if s > 0.0 { 1e-3 * s } else { s }).collect();
+            let mut x = vec![0.0; slack.len()];
+            coupling.close(&slack, &mut x);
+            let (mut torn, mut taken) = (setup.gather.zeros(), slack.clone());
+            setup.gather.add_transpose(1.0, &x, &mut torn);
+            setup.gather.apply(&torn, &mut taken);
+            let coupled: Vec<usize> = coupling.0.iter().flat_map(|gram| gram.rows().to_vec()).collect();
+            if setup.comm.size() == 1 {
+                assert!(coupled.iter().any(|&row| slack[row] >= 0.0 && x[row] != 0.0), "some rows join");
+                assert!(coupled.iter().any(|&row| slack[row] >= 0.0 && x[row] == 0.0), "some stay open");
+            }
+            assert!(coupled.iter().all(|&row| slack[row] - taken[row] > -1e-11));
+            setup.owned(&x)
+        };
+        same_on_any_ranks(&not_matching(&[]), close);
+    }
+}

@@ -1,0 +1,213 @@
+//! `B W B'` on some rows, with `W` diagonal, and its sparse Cholesky factor.
+
+use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
+use crate::constraint::{Constraints, Term};
+
+/// The matrix of some rows that share nodes. Rows that are not kept take no part.
+pub struct Gram {
+    rows: Vec<usize>,
+    column_begin: Vec<u32>,
+    row_index: Vec<u32>,
+    products: Vec<Product>,
+    analysis: Analysis,
+    workspace: Workspace,
+    factor: Factor,
+    /// Whether there is a factor.
+    definite: bool,
+    kept: Vec<bool>,
+    values: Vec<f64>,
+    unknowns: Vec<f64>,
+}
+
+/// Product of two coefficients at one unknown.
+struct Product {
+    entry: u32,
+    rows: [u32; 2],
+    value: f64,
+    slot: u32,
+    axis: u8,
+}
+
+/// A coefficient: its place among some rows, its slot, and itself.
+pub struct Coefficient<'a> {
+    /// Which of the rows.
+    pub place: usize,
+    /// The slot of its node.
+    pub slot: usize,
+    /// The coefficient and its unknown.
+    pub term: &'a Term,
+}
+
+impl Coefficient<'_> {
+    /// The unknown.
+    pub fn unknown(&self) -> (u32, u64, usize) {
+        (self.term.subdomain, self.term.node, self.term.axis)
+    }
+}
+
+/// Coefficients of some rows by their places, sorted by unknown, then by row.
+pub fn coefficients(constraints: &Constraints, rows: impl Iterator<Item = (usize, usize)>) -> Vec<Coefficient<'_>> {
+    let mut all = Vec::new();
+    for (place, row) in rows {
+        let parts = constraints.rows[row].terms.chunk_by(Term::share_slot);
+        for (slot, part) in constraints.slots(row).zip(parts) {
+            all.extend(part.iter().map(|term| Coefficient { place, slot, term }));
+        }
+    }
+    all.sort_by_key(|c| (c.unknown(), c.place));
+    all
+}
+
+impl Gram {
+    /// Of these rows, ascending.
+    pub fn new(constraints: &Constraints, rows: Vec<usize>) -> Self {
+        let mut products = Vec::new();
+        let coefficients = coefficients(constraints, rows.iter().copied().enumerate());
+        for same in coefficients.chunk_by(|a, b| a.unknown() == b.unknown()) {
+            for (k, a) in same.iter().enumerate() {
+                products.extend(same[..=k].iter().map(|b| Product {
+                    entry: 0,
+                    rows: [a.place as u32, b.place as u32],
+                    value: a.term.value * b.term.value,
+                    slot: a.slot as u32,
+                    axis: a.term.axis as u8,
+                }));
+            }
+        }
+        let mut places: Vec<[u32; 2]> = products.iter().map(|p| [p.rows[1], p.rows[0]]).collect();
+        places.extend((0..rows.len() as u32).map(|k| [k, k]));
+        places.sort_unstable();
+        places.dedup();
+        for product in &mut products {
+            let [row, column] = product.rows;
+            product.entry = places.binary_search(&[column, row]).expect("every product has its place") as u32;
+        }
+        let column_begin: Vec<u32> =
+            (0..=rows.len() as u32).map(|column| places.partition_point(|place| place[0] < column) as u32).collect();
+        let row_index: Vec<u32> = places.iter().map(|place| place[1]).collect();
+        let analysis = Analysis::minimum_degree(Lower { column_begin: &column_begin, rows: &row_index });
+        Self {
+            column_begin,
+            products,
+            workspace: Workspace::new([&analysis]),
+            factor: Factor::new(&analysis, Precision::Double),
+            analysis,
+            definite: false,
+            kept: vec![false; rows.len()],
+            values: vec![0.0; row_index.len()],
+            unknowns: vec![0.0; rows.len()],
+            row_index,
+            rows,
+        }
+    }
+
+    /// The rows.
+    pub fn rows(&self) -> &[usize] {
+        &self.rows
+    }
+
+    /// Whether any two rows share an unknown.
+    pub fn is_coupled(&self) -> bool {
+        self.row_index.len() > self.rows.len()
+    }
+
+    /// Factorises on the kept rows, `weight` being `W` by slot and axis.
+    pub fn factorise(&mut self, weight: impl Fn(usize, usize) -> f64, kept: impl Fn(usize) -> bool) {
+        self.kept.iter_mut().zip(&self.rows).for_each(|(k, &row)| *k = kept(row));
+        self.values.fill(0.0);
+        for p in self.products.iter().filter(|p| p.rows.iter().all(|&row| self.kept[row as usize])) {
+            self.values[p.entry as usize] += p.value * weight(p.slot as usize, p.axis.into());
+        }
+        // The identity fills the place of the others: one analysis serves all sets.
+        for (column, _) in self.kept.iter().enumerate().filter(|(_, kept)| !**kept) {
+            self.values[self.column_begin[column] as usize] = 1.0;
+        }
+        let lower = Lower { column_begin: &self.column_begin, rows: &self.row_index };
+        self.definite = self.workspace.factorise(&self.analysis, lower, &self.values, &mut self.factor).is_ok();
+    }
+
+    /// `y = (B W B')^-1 x` on its rows; zero on those that are not kept. Not a number if there is no inverse.
+    pub fn solve(&mut self, x: &[f64], y: &mut [f64]) {
+        for ((unknown, &row), &kept) in self.unknowns.iter_mut().zip(&self.rows).zip(&self.kept) {
+            *unknown = if kept { x[row] } else { 0.0 };
+        }
+        if self.definite {
+            self.workspace.solve(&self.analysis, &self.factor, &mut self.unknowns);
+        } else {
+            self.unknowns.fill(f64::NAN);
+        }
+        for ((&unknown, &row), &kept) in self.unknowns.iter().zip(&self.rows).zip(&self.kept) {
+            y[row] = if kept { unknown } else { 0.0 };
+        }
+    }
+
+    /// `y -= B B' x` on its rows, kept or not; `y` is by place.
+    pub fn subtract_product(&self, x: &[f64], y: &mut [f64]) {
+        for Product { rows: [a, b], value, .. } in &self.products {
+            let (a, b) = (*a as usize, *b as usize);
+            y[a] -= value * x[self.rows[b]];
+            if a != b {
+                y[b] -= value * x[self.rows[a]];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use faer::Mat;
+    use faer::prelude::Solve;
+
+    use super::*;
+    use crate::fixture::{assert_close, column, not_matching, on_ranks};
+
+    /// Weights that depend on the unknown alone.
+    fn weight(term: &Term) -> f64 {
+        1.0 + ((7 * u64::from(term.subdomain) + 3 * term.node + term.axis as u64) % 5) as f64
+    }
+
+    #[test]
+    fn solves_and_multiplies_as_dense_matrices_do_on_all_rows_and_on_some() {
+        on_ranks(&not_matching(&[]), 1, |setup| {
+            let constraints = &setup.discrete.constraints;
+            let largest = constraints.blocks.iter().max_by_key(|rows| rows.len()).expect("there are rows").clone();
+            let n = largest.len();
+            let mut gram = Gram::new(constraints, largest.clone().collect());
+            assert!(gram.is_coupled() && n > 100, "{n}");
+            // Dense, by the rows' own terms.
+            let product = |weighted: bool| {
+                Mat::from_fn(n, n, |i, j| {
+                    let [one, other] = [i, j].map(|k| &constraints.rows[largest.start + k].terms);
+                    let same = |a: &Term, b: &Term| (a.subdomain, a.node, a.axis) == (b.subdomain, b.node, b.axis);
+                    let factor = |a: &Term| if weighted { weight(a) } else { 1.0 };
+                    let pairs = one.iter().flat_map(|a| other.iter().filter(move |b| same(a, b)).map(move |b| (a, b)));
+                    pairs.map(|(a, b)| a.value * b.value * factor(a)).sum::<f64>()
+                })
+            };
+            let mut weights = vec![[0.0; 3]; constraints.slot_subdomain.len()];
+            for row in largest.clone() {
+                let parts = constraints.rows[row].terms.chunk_by(Term::share_slot);
+                for (slot, part) in constraints.slots(row).zip(parts) {
+                    part.iter().for_each(|term| weights[slot][term.axis] = weight(term));
+                }
+            }
+            let x = setup.multipliers(1);
+            for some in [false, true] {
+                let kept = |row: usize| !some || row % 3 > 0;
+                gram.factorise(|slot, axis| weights[slot][axis], kept);
+                let mut y = vec![f64::NAN; x.len()];
+                gram.solve(&x, &mut y);
+                let list: Vec<usize> = (0..n).filter(|k| kept(largest.start + k)).collect();
+                let dense = product(true);
+                let dense = Mat::from_fn(list.len(), list.len(), |i, j| dense[(list[i], list[j])]);
+                let rhs: Vec<f64> = list.iter().map(|k| x[largest.start + k]).collect();
+                let found: Vec<f64> = list.iter().map(|k| y[largest.start + k]).collect();
+                assert_close(&column(&found), &dense.partial_piv_lu().solve(column(&rhs)), 1e-11);
+                assert!(largest.clone().all(|row| kept(row) || y[row] == 0.0));
+            }
+            let mut y = vec![0.0; n];
+            gram.subtract_product(&x, &mut y);
+            assert_close(&column(&y), &(-product(false) * column(&x[largest.clone()])), 1e-12);
+        });
+    }
+}
