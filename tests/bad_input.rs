@@ -74,7 +74,14 @@ fn surfaces_that_do_not_exist_are_named() {
 #[test]
 fn surfaces_that_nowhere_face_each_other_are_no_contact() {
     assert_override_refused("body.upper.brick.origin.0=5000", &["contact.joint", "opposite"]);
-    assert_override_refused("body.upper.brick.cells=[6, 4, 4]", &["contact.joint", "match"]);
+}
+
+#[test]
+fn contact_that_would_hold_twice_is_refused() {
+    let twin = "[contact.other]\nslave = \"lower.zmax\"\nmaster = \"upper.zmin\"\n[decomposition]";
+    assert_text_refused("[decomposition]", twin, &["contact.other.master", "contact.joint", "same two surfaces"]);
+    let sets = ["body.upper.brick.cells=[6, 4, 4]", "support.top.surface=upper.zmin"];
+    assert_scene_refused("patch", &sets, BAD_SCENE, &["contact.joint", "hold all nodes", "swap slave and master"]);
 }
 
 #[test]

@@ -119,3 +119,9 @@ fn contact_with_an_obstacle_gives_the_same_bits_on_1_2_3_and_5_ranks() {
     let sets = ["body.cube.brick.cells=[8, 8, 8]", "decomposition.cells=[4, 4, 4]"];
     assert_eq!(assert_independent_of_ranks("step-42", &sets, &RANKS), 8);
 }
+
+#[test]
+fn contact_of_meshes_that_do_not_match_gives_the_same_bits_on_1_2_3_and_5_ranks() {
+    let cells = ["body.upper.brick.cells=[6, 5, 4]", "decomposition.cells=[2, 1, 2]"];
+    assert_independent_of_ranks("patch", &cells, &[1, 2, 3, 5]);
+}

@@ -5,7 +5,7 @@
 //! support rows and the active rows independent. Of rows with one direction (a node that meets two obstacles alike) only
 //! the tightest counts, which implies the others.
 
-use super::{Kind, Row, Term};
+use super::{Held, Kind, Row, Term};
 use crate::contact::ContactPair;
 use crate::decomposition::InterfaceNode;
 
@@ -27,14 +27,18 @@ pub(super) fn nodes(pair: &ContactPair) -> impl Iterator<Item = (u64, f64)> {
 /// If supports fix all nodes along the normal: the distance that is left for good (length).
 pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> Side<'a>) -> Result<Row, f64> {
     let mut rhs = pair.gap;
-    let mut terms = Vec::new();
+    let (mut terms, mut held) = (Vec::new(), Vec::new());
     let mut square = 0.0;
     for (node, factor) in nodes(pair) {
         let (node, fixed) = sides(node);
         let weight = factor / node.copies.len() as f64;
-        for (axis, (component, held)) in pair.normal.into_iter().zip(fixed).enumerate() {
-            match held {
-                Some((_, value)) => rhs -= factor * component * value,
+        for (axis, (component, support)) in pair.normal.into_iter().zip(fixed).enumerate() {
+            match support {
+                Some((support, value)) => {
+                    let weight = factor * component;
+                    rhs -= weight * value;
+                    held.push(Held { support, axis, weight });
+                }
                 None if component == 0.0 => {}
                 None => {
                     square += component * component * factor * factor / node.copies.len() as f64;
@@ -50,7 +54,7 @@ pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> 
     }
     let scale = 1.0 / square.sqrt();
     terms.iter_mut().for_each(|term| term.value *= scale);
-    Ok(Row { kind: Kind::Contact { pair: number }, rhs: scale * rhs, scale, terms })
+    Ok(Row { kind: Kind::Contact { pair: number }, rhs: scale * rhs, scale, terms, held })
 }
 
 /// Adds a row to those of the same slave node, unless one of them implies it; takes its place where it implies that one.

@@ -70,6 +70,7 @@ pub(super) fn rows(node: &InterfaceNode, fixed: &[Option<(usize, f64)>; 3]) -> V
             .iter()
             .map(|&subdomain| Term { subdomain, node: node.node, axis, value: 1.0 / root })
             .collect(),
+        held: Vec::new(),
     };
     (0..3).filter_map(|axis| fixed[axis].map(|(support, value)| row(axis, support, value))).collect()
 }

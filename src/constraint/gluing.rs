@@ -16,7 +16,7 @@ pub(super) fn rows(node: &InterfaceNode) -> Vec<Row> {
                 let value = if copy < k { before } else { -(k as f64) * before };
                 Term { subdomain, node: node.node, axis, value }
             });
-            rows.push(Row { kind: Kind::Gluing, rhs: 0.0, scale: before, terms: terms.collect() });
+            rows.push(Row { kind: Kind::Gluing, rhs: 0.0, scale: before, terms: terms.collect(), held: Vec::new() });
         }
     }
     rows

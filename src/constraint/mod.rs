@@ -61,6 +61,19 @@ pub struct Row {
     pub scale: f64,
     /// Its coefficients.
     pub terms: Vec<Term>,
+    /// Components of a contact's condition that supports fix, which are part of the right-hand side.
+    pub held: Vec<Held>,
+}
+
+/// A component of a contact's condition that a support fixes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Held {
+    /// Index of the support in the scene.
+    pub support: usize,
+    /// Component.
+    pub axis: usize,
+    /// Its coefficient in the condition; the support takes as much of the contact force.
+    pub weight: f64,
 }
 
 impl Term {

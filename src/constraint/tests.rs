@@ -4,7 +4,9 @@ use super::contact;
 use super::{ConstraintError, Constraints, Kind, Row, Support};
 use crate::contact::ContactPair;
 use crate::decomposition::{InterfaceNode, Subdomain};
-use crate::fixture::{RANKS, Setup, assert_close, built_in, column, on_ranks, two_bricks, two_bricks_by_metis};
+use crate::fixture::{
+    RANKS, Setup, assert_close, built_in, column, not_matching, on_ranks, two_bricks, two_bricks_by_metis,
+};
 use crate::scene::Scene;
 
 /// Contact of subdomains that do not match, nodes with eight copies, METIS parts.
@@ -31,6 +33,24 @@ fn rows_are_orthonormal() {
     assert_eq!(most, [Some(8)]);
 }
 
+#[test]
+fn rows_of_meshes_that_do_not_match_are_unit_vectors_and_independent() {
+    // The second one holds slave nodes along the normal.
+    for sets in [&[][..], &["support.right.surface=upper.xmin"], &["decomposition.subdomains=11"]] {
+        let independent = |setup: &Setup| {
+            let b = setup.dense_rows();
+            let gram = &b * b.transpose();
+            assert!((0..b.nrows()).all(|row| (gram[(row, row)] - 1.0).abs() < 1e-14));
+            let eigenvalues = gram.self_adjoint_eigenvalues(faer::Side::Lower).expect("they exist");
+            assert!(eigenvalues[0] > 1e-3, "{sets:?}: {}", eigenvalues[0]);
+            (0..b.nrows()).filter(|&row| setup.rows()[row].is_inequality()).count()
+        };
+        let contacts = on_ranks(&not_matching(sets), 1, independent)[0];
+        // Nodes of the slave surface over the master: 4 of 5 columns, less the one that is held.
+        assert_eq!(contacts, if sets.contains(&"support.right.surface=upper.xmin") { 15 } else { 20 });
+    }
+}
+
 /// A rigid motion of space: displacement of a point.
 fn motion(point: [f64; 3]) -> [f64; 3] {
     let (shift, turn) = ([0.3, -0.7, 0.2], [0.4, 0.5, -0.6]);
@@ -42,7 +62,7 @@ fn motion(point: [f64; 3]) -> [f64; 3] {
 
 #[test]
 fn a_common_motion_leaves_gluing_at_rest_and_is_seen_by_supports_and_contact() {
-    for scene in scenes() {
+    for scene in scenes().into_iter().chain([not_matching(&["support.right.surface=upper.xmin"])]) {
         on_ranks(&scene, 1, |setup| {
             let motions = |s: &Subdomain| s.points.iter().flat_map(|&p| motion(p)).collect::<Vec<_>>();
             let u: Vec<f64> = setup.subdomains().iter().flat_map(motions).collect();
@@ -77,7 +97,7 @@ fn point(setup: &Setup, node: u64) -> [f64; 3] {
 
 #[test]
 fn every_rank_holds_the_blocks_of_its_subdomains_and_all_ranks_the_same_rows() {
-    for scene in [two_bricks(&[]), two_bricks_by_metis(9)] {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(9), not_matching(&[])] {
         let blocks = |constraints: &Constraints| -> Vec<(Vec<u32>, Vec<Row>)> {
             let rows = constraints.blocks.iter().map(|rows| constraints.rows[rows.clone()].to_vec());
             constraints.block_subdomains.iter().cloned().zip(rows).collect()
@@ -150,6 +170,8 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
     let square: f64 = row.terms.iter().map(|t| t.value * t.value).sum();
     assert!((square - 1.0).abs() < 1e-15);
     assert!((row.rhs - row.scale * (0.5 - 0.6 * 0.25 + 0.75 * 0.6 * 0.25)).abs() < 1e-15);
+    let held: Vec<_> = row.held.iter().map(|h| (h.support, h.axis, h.weight)).collect();
+    assert_eq!(held, [(0, 0, 0.6), (0, 0, -0.75 * 0.6)]);
     let expected = [
         (6, [0.5 * 0.6, 0.0, 0.5 * 0.8]),
         (7, [0.0, 0.0, 0.8]),

@@ -95,8 +95,13 @@ impl TornProblem<'_> {
         let mut partial = vec![0.0; 3 * supports * self.space.owned().len()];
         for (sum, owned) in partial.chunks_exact_mut((3 * supports).max(1)).zip(self.space.owned()) {
             for &row in owned {
-                if let Kind::Support { support, axis } = self.constraints.rows[row as usize].kind {
-                    sum[3 * support + axis] -= rows[row as usize] / self.constraints.rows[row as usize].scale;
+                let (value, force, row) =
+                    (rows[row as usize], lambda[row as usize], &self.constraints.rows[row as usize]);
+                if let Kind::Support { support, axis } = row.kind {
+                    sum[3 * support + axis] -= value / row.scale;
+                }
+                for held in &row.held {
+                    sum[3 * held.support + held.axis] += row.scale * force * held.weight;
                 }
             }
         }

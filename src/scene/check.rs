@@ -143,7 +143,14 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
             let key = format!("{key}.master");
             surface(scene, &key, master)?;
             let rule = "slave and master must be on different bodies; a body does not touch itself";
-            require(slave.body != master.body, &key, master.to_string(), rule)
+            require(slave.body != master.body, &key, master.to_string(), rule)?;
+            let same = |(_, other): &(&String, &Contact)| {
+                let surfaces: Vec<_> = other.surfaces().collect();
+                surfaces.len() == 2 && surfaces.contains(&slave) && surfaces.contains(&master)
+            };
+            let twin = scene.contact.iter().take_while(|(_, other)| !std::ptr::eq(*other, contact)).find(same);
+            let rule = |other: &str| format!("contact.{other} is between the same two surfaces; remove one of the two");
+            twin.map_or(Ok(()), |(other, _)| require(false, &key, master.to_string(), rule(other)))
         }
         Contact::Rigid { rigid, .. } => rigid.check(&format!("{key}.rigid")),
     }

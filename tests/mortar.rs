@@ -1,0 +1,77 @@
+//! Contact of meshes that do not match beyond homogeneous states: balance of forces where contact meets supports, and
+//! agreement with meshes that match.
+
+mod common;
+
+use common::{assert_close, assert_residuals, number, scene_file, solve_tightly, vector};
+use serde_json::Value;
+
+/// A block on a larger one, pressed down and held at one side, down to the contact, where that side moves down too. The
+/// lower block has `cells` along x and y.
+fn summary(cells: [usize; 2], slave: &str, master: &str, sets: &[&str]) -> Value {
+    let text = format!(
+        r#"
+        [material.steel]
+        young = 210000.0
+        poisson = 0.29
+        yield_stress = 450.0
+        hardening = 10000.0
+        [body.lower]
+        material = "steel"
+        element = "tet4"
+        brick = {{ origin = [-200.0, -200.0, 0.0], size = [1200.0, 1200.0, 600.0], cells = [{}, {}, 6] }}
+        [body.upper]
+        material = "steel"
+        element = "tet4"
+        brick = {{ origin = [0.0, 0.0, 600.0], size = [800.0, 800.0, 600.0], cells = [8, 8, 6] }}
+        [support.ground]
+        surface = "lower.zmin"
+        fix = ["x", "y", "z"]
+        [support.wall]
+        surface = "upper.xmin"
+        fix = ["x", "y", "z"]
+        displacement = [0.0, 0.0, -0.2]
+        [load.top]
+        surface = "upper.zmax"
+        traction = [10.0, 0.0, -200.0]
+        [contact.joint]
+        slave = "{slave}"
+        master = "{master}"
+        [decomposition]
+        subdomains = 8"#,
+        cells[0], cells[1]
+    );
+    let directory = tempfile::tempdir().unwrap();
+    solve_tightly(2, &scene_file(directory.path(), &text), sets).summary()
+}
+
+#[test]
+fn forces_balance_where_contact_meets_a_support() {
+    let (upper, lower) = ("upper.zmin", "lower.zmax");
+    for (slave, master, sign) in [(upper, lower, 1.0), (lower, upper, -1.0)] {
+        let summary = summary([7, 10], slave, master, &[]);
+        assert_residuals(&summary, 1e-9);
+        let contact = vector(&summary["contact_force"]).map(|f| sign * f);
+        let (ground, wall) = (vector(&summary["reactions"]["ground"]), vector(&summary["reactions"]["wall"]));
+        let load = [10.0, 0.0, -200.0].map(|t| t * 800.0 * 800.0);
+        for axis in 0..3 {
+            let left = [ground[axis] - contact[axis], wall[axis] + contact[axis] + load[axis]];
+            assert!(left.iter().all(|f| f.abs() < 1e-8 * load[2].abs()), "axis {axis}: {left:?} is left");
+        }
+        assert!(contact[2] > 0.2 * load[2].abs(), "{contact:?}");
+    }
+}
+
+#[test]
+fn both_solvers_find_one_solution_and_it_is_near_that_of_meshes_that_match() {
+    let found =
+        ["solver.qp=active-set", "solver.qp=smalse-m"].map(|qp| summary([14, 10], "upper.zmin", "lower.zmax", &[qp]));
+    assert_close("energy", number(&found[0], "energy"), number(&found[1], "energy"), 1e-9);
+    assert_eq!(found[0]["active_contacts"], found[1]["active_contacts"]);
+    // Without the wall's motion, which would concentrate the contact force at the edge.
+    let still = "support.wall.displacement.2=0";
+    let [mortar, matching] = [[14, 10], [12, 12]].map(|cells| summary(cells, "upper.zmin", "lower.zmax", &[still]));
+    assert_close("energy", number(&mortar, "energy"), number(&matching, "energy"), 0.01);
+    let [mortar, matching] = [mortar, matching].map(|summary| vector(&summary["contact_force"])[2]);
+    assert_close("contact force", mortar, matching, 0.01);
+}
