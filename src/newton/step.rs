@@ -236,7 +236,7 @@ impl<'a> StepSolver<'a> {
             let outcome = timer.time("factorisation", || factors.factorise(own, subdomain, values, common));
             let drift = &mut self.drift[own];
             let outcome = outcome.and_then(|()| match &mut self.preconditioner {
-                Some(Preconditioner { schur, .. }) if !(*drift <= DRIFT) => {
+                Some(Preconditioner { schur, .. }) if drift.is_nan() || *drift > DRIFT => {
                     *drift = 0.0;
                     let update = || schur.update(own, subdomain.id, values, common);
                     timer.time("factorisation of the interior", update)
