@@ -217,7 +217,8 @@ fn cut(wanted: &scene::Decomposition, bodies: &[BodyMesh]) -> Cut {
 }
 
 fn material(m: &scene::Material) -> Material {
-    Material { young: m.young, poisson: m.poisson, yield_stress: m.yield_stress, hardening: m.hardening }
+    let scene::Material { young, poisson, yield_stress, hardening, kinematic_hardening } = *m;
+    Material { young, poisson, yield_stress, hardening, kinematic_hardening }
 }
 
 /// Counts what a discrete problem consists of, in the paper's way. Collective.

@@ -94,7 +94,7 @@ mod tests {
     const CYLINDER: Cylinder = Cylinder {
         inner: 100.0,
         outer: 200.0,
-        material: Material { young: 210.0, poisson: 0.3, yield_stress: Some(0.24), hardening: 0.0 },
+        material: Material { yield_stress: Some(0.24), ..Material::elastic(210.0, 0.3) },
     };
 
     #[test]

@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn perfect_plasticity_of_de_souza_neto() {
-        let material = Material { young: 210.0, poisson: 0.3, yield_stress: Some(0.24), hardening: 0.0 };
+        let material = Material { yield_stress: Some(0.24), ..Material::elastic(210.0, 0.3) };
         let sphere = HollowSphere { material, ..SPHERE };
         close(sphere.pressure_of_front(200.0), 0.33271, 1e-5);
         for (p, c, ub) in [(0.15, 102.42240, 0.02148893), (0.3, 157.56236, 0.07823254)] {

@@ -1,9 +1,10 @@
 //! Closed forms to compare a computation with: no mesh, no element, no solver.
 //!
 //! All of them but [`cylinder`] have proportional deviatoric paths, so that one implicit step from the virgin state is
-//! exact and the one-step program must meet them up to discretisation.
+//! exact and the program must meet them up to discretisation, in one step or, along [`cycle`]s, in one a reversal.
 
 pub mod blocks;
+pub mod cycle;
 pub mod cylinder;
 pub mod hollow_sphere;
 pub mod homogeneous;

@@ -1,7 +1,7 @@
 //! Constitutive models: what stress a strain gives, given the history of the point.
 //!
-//! [`elastic`] is Hooke's law, [`von_mises`] adds J2 plasticity with linear isotropic hardening in one implicit step
-//! from a committed [`History`]. Small strains, rate independent, isotropic; no element and no mesh.
+//! [`elastic`] is Hooke's law, [`von_mises`] adds J2 plasticity with linear isotropic and kinematic hardening in one
+//! implicit step from a committed [`History`]. Small strains, rate independent, isotropic; no element and no mesh.
 
 pub mod elastic;
 pub mod von_mises;
@@ -19,12 +19,14 @@ pub struct Material {
     pub yield_stress: Option<f64>,
     /// Slope H >= 0 of yield stress over accumulated plastic strain; 0 is perfect plasticity.
     pub hardening: f64,
+    /// Slope C >= 0 of the back stress over plastic strain, both uniaxial (Prager's rule).
+    pub kinematic_hardening: f64,
 }
 
 impl Material {
     /// An elastic material.
-    pub fn elastic(young: f64, poisson: f64) -> Self {
-        Self { young, poisson, yield_stress: None, hardening: 0.0 }
+    pub const fn elastic(young: f64, poisson: f64) -> Self {
+        Self { young, poisson, yield_stress: None, hardening: 0.0, kinematic_hardening: 0.0 }
     }
 
     /// Lame's second constant mu = E / (2 (1 + nu)), the shear modulus.
@@ -48,6 +50,11 @@ pub(crate) mod samples {
     use super::Material;
 
     /// The paper's steel, in MPa.
-    pub const STEEL: Material =
-        Material { young: 210000.0, poisson: 0.29, yield_stress: Some(450.0), hardening: 10000.0 };
+    pub const STEEL: Material = Material {
+        young: 210000.0,
+        poisson: 0.29,
+        yield_stress: Some(450.0),
+        hardening: 10000.0,
+        kinematic_hardening: 0.0,
+    };
 }

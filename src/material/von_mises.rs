@@ -1,22 +1,25 @@
-//! Von Mises plasticity with linear isotropic hardening, one implicit Euler step from a committed state.
+//! Von Mises plasticity with linear isotropic and kinematic hardening, one implicit Euler step from a committed state.
 //!
-//! With the trial stress of the elastic strain `strain - plastic_strain`, its equivalent stress q and the excess
-//! f = (q - sigma_y - H kappa)+, the step is (de Souza Neto, Peric, Owen, Computational Methods for Plasticity, 7.3-7.4)
+//! With the back stress alpha = 2/3 C plastic_strain (Prager), the trial stress of the elastic strain
+//! `strain - plastic_strain`, the equivalent stress q of xi = dev sigma_trial - alpha and the excess
+//! f = (q - sigma_y - H kappa)+, the step is (de Souza Neto, Peric, Owen, Computational Methods for Plasticity, 7.3-7.6)
 //!
 //! ```text
-//! dkappa = f / (3 mu + H),   dev sigma = (1 - 3 mu dkappa / q) dev sigma_trial,   tr sigma = tr sigma_trial
-//! tangent = K 1x1 + 2 mu (1 - 3 mu dkappa / q) I_dev + 6 mu^2 (dkappa / q - 1 / (3 mu + H)) NxN,   N = dev / |dev|
-//! Psi = 1/2 strain_e : C : strain_e - f^2 / (2 (3 mu + H)),   D Psi = sigma
+//! dkappa = f / (3 mu + H + C),   dev sigma = alpha + (1 - 3 mu dkappa / q) xi,   tr sigma = tr sigma_trial
+//! tangent = K 1x1 + 2 mu (1 - 3 mu dkappa / q) I_dev + 6 mu^2 (dkappa / q - 1 / (3 mu + H + C)) NxN,   N = xi / |xi|
+//! Psi = 1/2 strain_e : C_e : strain_e - f^2 / (2 (3 mu + H + C)),   D Psi = sigma
 //! ```
 //!
-//! Psi is the least, over dkappa >= 0, of elastic energy + sigma_y dkappa + H/2 ((kappa + dkappa)^2 - kappa^2), hence
-//! convex and once differentiable: it counts what is stored elastically and what *this* step dissipates or stores by
-//! hardening, not what former steps did. No kinematic hardening, no rate dependence, no plane stress.
+//! Psi is, but for a constant, the least over dkappa >= 0 of elastic energy + sigma_y dkappa + what isotropic and
+//! kinematic hardening store, hence convex and once differentiable: it counts what is stored elastically and what *this*
+//! step dissipates or stores by hardening, not what former steps did. The step is exact for radial paths from the
+//! committed state. No rate dependence, no plane stress.
 
 use super::Material;
 use crate::tensor::{Tangent, Voigt, deviator, trace};
 
-/// What a material point remembers between load steps; zero is the virgin state.
+/// What a material point remembers between load steps; zero is the virgin state. The back stress follows from the
+/// plastic strain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct History {
     /// Plastic strain, engineering shears, traceless.
@@ -32,23 +35,37 @@ pub struct Response {
     pub stress: Voigt,
     /// One-step potential Psi, energy per volume.
     pub energy: f64,
-    /// Whether the trial stress is outside the yield surface.
+    /// Whether the trial stress is outside the yield surface, by more than round-off.
     pub plastic: bool,
     /// Accumulated plastic strain at the end of the step.
     pub kappa: f64,
 }
 
+/// An excess below this share of the yield stress is round-off: a point that flowed before and is not strained further
+/// answers elastically, whichever side of the yield surface rounding puts it on.
+const ROUNDING: f64 = 1e-12;
+
 /// The elastic predictor and how far it is beyond the yield surface.
 struct Trial {
     pressure: f64,
-    deviator: Voigt,
+    /// Back stress alpha.
+    back: Voigt,
+    /// Deviator of the stress less the back stress, xi.
+    relative: Voigt,
+    /// Equivalent stress of `relative`.
     equivalent: f64,
     energy: f64,
+    yield_stress: f64,
     excess: f64,
     /// Increment of accumulated plastic strain.
     step: f64,
-    /// Factor 1 - 3 mu dkappa / q of the deviator; 1 in an elastic step.
+    /// Factor 1 - 3 mu dkappa / q of `relative`; 1 in an elastic step.
     shrink: f64,
+}
+
+/// Equivalent stress of a deviator.
+fn equivalent(deviator: &Voigt) -> f64 {
+    1.5f64.sqrt() * crate::tensor::stress_norm(deviator)
 }
 
 impl Trial {
@@ -58,32 +75,56 @@ impl Trial {
         let volume = trace(&elastic);
         let d = deviator(&elastic);
         let s = [2.0 * mu * d[0], 2.0 * mu * d[1], 2.0 * mu * d[2], mu * d[3], mu * d[4], mu * d[5]];
-        let equivalent = 1.5f64.sqrt() * crate::tensor::stress_norm(&s);
-        let energy = 0.5 * bulk * volume * volume + equivalent * equivalent / (6.0 * mu);
-        let mut trial =
-            Self { pressure: bulk * volume, deviator: s, equivalent, energy, excess: 0.0, step: 0.0, shrink: 1.0 };
+        let back = material.back_stress(committed);
+        let relative: Voigt = std::array::from_fn(|i| s[i] - back[i]);
+        let q = equivalent(&relative);
+        let of_stress = if material.kinematic_hardening == 0.0 { q } else { equivalent(&s) };
+        let mut trial = Self {
+            pressure: bulk * volume,
+            back,
+            relative,
+            equivalent: q,
+            energy: 0.5 * bulk * volume * volume + of_stress * of_stress / (6.0 * mu),
+            yield_stress: f64::INFINITY,
+            excess: 0.0,
+            step: 0.0,
+            shrink: 1.0,
+        };
         if let Some(initial) = material.yield_stress {
-            let yield_stress = initial + material.hardening * committed.kappa;
-            if equivalent > yield_stress {
-                trial.excess = equivalent - yield_stress;
-                trial.step = trial.excess / (3.0 * mu + material.hardening);
+            trial.yield_stress = initial + material.hardening * committed.kappa;
+            if q > trial.yield_stress {
+                trial.excess = q - trial.yield_stress;
+                trial.step = trial.excess / material.plastic_modulus();
                 // Equals 1 - 3 mu step / q, without its cancellation.
-                trial.shrink = (yield_stress + material.hardening * trial.step) / equivalent;
+                let hardening = material.hardening + material.kinematic_hardening;
+                trial.shrink = (trial.yield_stress + hardening * trial.step) / q;
             }
         }
         trial
     }
 
     fn plastic(&self) -> bool {
-        self.excess > 0.0
+        self.excess > ROUNDING * self.yield_stress
     }
 }
 
 impl Material {
+    /// 3 mu + H + C: what the equivalent stress falls by, beyond the yield surface, for a unit of plastic strain.
+    fn plastic_modulus(&self) -> f64 {
+        3.0 * self.shear_modulus() + self.hardening + self.kinematic_hardening
+    }
+
+    /// The back stress 2/3 C plastic_strain, a deviator.
+    pub fn back_stress(&self, committed: &History) -> Voigt {
+        let (normal, shear) = (2.0 / 3.0 * self.kinematic_hardening, 1.0 / 3.0 * self.kinematic_hardening);
+        let [xx, yy, zz, xy, yz, zx] = committed.plastic_strain;
+        [normal * xx, normal * yy, normal * zz, shear * xy, shear * yz, shear * zx]
+    }
+
     /// Stress, potential and plasticity at `strain`, one step away from `committed`.
     pub fn respond(&self, strain: &Voigt, committed: &History) -> Response {
         let trial = Trial::new(self, strain, committed);
-        let mut stress = trial.deviator.map(|s| trial.shrink * s);
+        let mut stress: Voigt = std::array::from_fn(|i| trial.shrink * trial.relative[i] + trial.back[i]);
         stress[..3].iter_mut().for_each(|s| *s += trial.pressure);
         Response {
             stress,
@@ -93,8 +134,8 @@ impl Material {
         }
     }
 
-    /// The consistent tangent d stress / d strain of the same step: symmetric, at most C, at least H / (3 mu + H) C.
-    /// In an elastic step it is [`Material::elastic_tangent`] to the last bit.
+    /// The consistent tangent d stress / d strain of the same step: symmetric, at most C_e, at least
+    /// (H + C) / (3 mu + H + C) C_e. In an elastic step it is [`Material::elastic_tangent`] to the last bit.
     pub fn tangent(&self, strain: &Voigt, committed: &History) -> Tangent {
         let trial = Trial::new(self, strain, committed);
         if !trial.plastic() {
@@ -102,17 +143,17 @@ impl Material {
         }
         let (bulk, mu) = (self.bulk_modulus(), self.shear_modulus());
         let shear = mu * trial.shrink;
-        // N x N = 3/2 dev x dev / q^2.
+        // N x N = 3/2 xi x xi / q^2.
         let q = trial.equivalent;
-        let along = 9.0 * mu * mu * (trial.step / q - 1.0 / (3.0 * mu + self.hardening)) / (q * q);
+        let along = 9.0 * mu * mu * (trial.step / q - 1.0 / self.plastic_modulus()) / (q * q);
         let mut c = [[0.0; 6]; 6];
         for i in 0..3 {
             c[i][..3].fill(bulk - 2.0 / 3.0 * shear);
             c[i][i] += 2.0 * shear;
             c[i + 3][i + 3] = shear;
         }
-        for (row, si) in c.iter_mut().zip(trial.deviator) {
-            for (entry, sj) in row.iter_mut().zip(trial.deviator) {
+        for (row, si) in c.iter_mut().zip(trial.relative) {
+            for (entry, sj) in row.iter_mut().zip(trial.relative) {
                 *entry += along * (si * sj);
             }
         }
@@ -128,7 +169,7 @@ impl Material {
         let flow = 1.5 * trial.step / trial.equivalent;
         let factor = [flow, flow, flow, 2.0 * flow, 2.0 * flow, 2.0 * flow];
         History {
-            plastic_strain: std::array::from_fn(|i| committed.plastic_strain[i] + factor[i] * trial.deviator[i]),
+            plastic_strain: std::array::from_fn(|i| committed.plastic_strain[i] + factor[i] * trial.relative[i]),
             kappa: committed.kappa + trial.step,
         }
     }

@@ -55,7 +55,7 @@ fn names<'a>(known: impl Iterator<Item = &'a String>) -> String {
 }
 
 fn material(key: &str, material: &Material) -> Checked {
-    let Material { young, poisson, yield_stress, hardening } = *material;
+    let Material { young, poisson, yield_stress, hardening, kinematic_hardening } = *material;
     let positive = |value: f64| value.is_finite() && value > 0.0;
     require(positive(young), &format!("{key}.young"), young, "must be positive and finite")?;
     let rule = "must be above -1 and below 0.5, where the material would be incompressible";
@@ -65,7 +65,10 @@ fn material(key: &str, material: &Material) -> Checked {
         require(positive(stress), &format!("{key}.yield_stress"), stress, rule)?;
     }
     let rule = "must be finite and not negative (0 is perfect plasticity): softening has no unique solution";
-    require(hardening.is_finite() && hardening >= 0.0, &format!("{key}.hardening"), hardening, rule)
+    let allowed = |slope: f64| slope.is_finite() && slope >= 0.0;
+    require(allowed(hardening), &format!("{key}.hardening"), hardening, rule)?;
+    let rule = "must be finite and not negative";
+    require(allowed(kinematic_hardening), &format!("{key}.kinematic_hardening"), kinematic_hardening, rule)
 }
 
 fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
