@@ -11,6 +11,7 @@ import sys
 import h5py
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkCommonDataModel import vtkPartitionedDataSet
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -37,12 +38,16 @@ def check_hdf5(path):
         assert grid["Connectivity"].shape == (entries.sum(),)
         assert grid["Offsets"].shape == (cells.sum() + pieces,)
         check_pieces(grid, points, cells, entries)
+        times = check_steps(grid, pieces)
         for group, rows in (("PointData", points.sum()), ("CellData", cells.sum())):
             for name, field in grid[group].items():
-                assert len(field) == rows, f"{name}: {len(field)} rows for {rows}"
+                changes = grid[f"Steps/{group}Offsets/{name}"][-1] > 0 if times is not None else False
+                states = len(times) if changes else 1
+                assert len(field) == states * rows, f"{name}: {len(field)} rows for {states} states of {rows}"
                 odd = ~np.isfinite(field[:]) & ~(np.isnan(field[:]) & (name in NAN_WHERE_UNDEFINED))
                 assert not odd.any(), f"{name} has values that are not finite"
-        assert grid["PointData/displacement"].shape == (points.sum(), 3)
+        states = 1 if times is None else len(times)
+        assert grid["PointData/displacement"].shape == (states * points.sum(), 3)
         columns = {len(column) for column in file["convergence"].values()}
         assert len(columns) <= 1, f"columns of different lengths: {columns}"
         provenance = {name: text[()].decode() for name, text in file["provenance"].items()}
@@ -52,7 +57,23 @@ def check_hdf5(path):
         print(f"h5py: {pieces} pieces, {points.sum()} points, {cells.sum()} cells, all fields finite")
         print(f"      empty pieces: {int((cells == 0).sum())}; fields: {[*fields['PointData'], *fields['CellData']]}")
         print(f"      provenance: {len(provenance)} texts; convergence: {list(file['convergence'])}")
-        return grid["Points"][:], cells.sum(), fields
+        return grid["Points"][:], cells.sum(), fields, times
+
+
+def check_steps(grid, pieces):
+    """The times of a series, `None` for a single state: one mesh, and fields one state behind the other."""
+    if "Steps" not in grid:
+        return None
+    steps = grid["Steps"]
+    times = steps["Values"][:]
+    assert steps.attrs["NSteps"] == len(times) > 1 and (np.diff(times) > 0).all(), times
+    assert (steps["NumberOfParts"][:] == [pieces] * len(times)).all()
+    for name in ("PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"):
+        assert (steps[name][:] == [0] * len(times)).all(), name
+    for group in ("PointData", "CellData"):
+        assert set(steps[f"{group}Offsets"]) == set(grid[group]), group
+    print(f"      times: {times}")
+    return times
 
 
 def check_pieces(grid, points, cells, entries):
@@ -70,13 +91,31 @@ def check_pieces(grid, points, cells, entries):
         first_offset, first_cell, first_entry = first_offset + n_cells + 1, first_cell + n_cells, first_entry + n_entries
 
 
-def check_vtk(path, points, cells, fields):
-    """VTK finds the same points and values, in the same order."""
+def check_vtk(path, points, cells, fields, times):
+    """VTK finds the same points and values, in the same order, at every time."""
     reader = vtkHDFReader()
     assert reader.CanReadFile(path), "VTK does not take it for a VTKHDF file"
     reader.SetFileName(path)
-    reader.Update()
-    data = reader.GetOutputDataObject(0)
+    reader.UpdateInformation()
+    if times is None:
+        reader.Update()
+        check_state(reader.GetOutputDataObject(0), points, cells, fields)
+        return
+    known = reader.GetOutputInformation(0)
+    found = [known.Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS(), i) for i in range(len(times))]
+    assert found == list(times), found
+    for i, time in enumerate(times):
+        rows = {"PointData": len(points), "CellData": cells}
+        state = {
+            group: {name: v[i * rows[group] :][: rows[group]] if len(v) > rows[group] else v for name, v in all.items()}
+            for group, all in fields.items()
+        }
+        reader.UpdateTimeStep(time)
+        check_state(reader.GetOutputDataObject(0), points, cells, state)
+
+
+def check_state(data, points, cells, fields):
+    """VTK's data at one time."""
     if isinstance(data, vtkPartitionedDataSet):
         blocks = [data.GetPartition(i) for i in range(data.GetNumberOfPartitions())]
     else:

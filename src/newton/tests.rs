@@ -27,7 +27,8 @@ fn solve(scene: &Scene, ranks: usize) -> (Summary, Vec<u64>) {
         let solved =
             study::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("the bodies are held");
         let field = solved.piece.point_data.into_iter().find(|field| field.name == "displacement");
-        let Some(Field { values: Values::Real(u), .. }) = field else { panic!("displacements are real") };
+        let mut states = field.map(|field: Field| field.states).unwrap_or_default();
+        let Some(Values::Real(u)) = states.pop() else { panic!("displacements are real") };
         (solved.summary, u)
     });
     let displacements = parts.iter().flat_map(|(_, u)| u).map(|u| u.to_bits()).collect();

@@ -110,16 +110,31 @@ impl<'a> SharedFile<'a> {
     /// # Errors
     /// If HDF5 refuses or the disk is full.
     pub fn rows<T: Number>(&self, name: &str, width: usize, mine: &[T]) -> Result<(), String> {
-        let count = (mine.len() / width) as u64;
+        self.states(name, width, &[mine])
+    }
+
+    /// Writes several states of such an array, each with as many rows, one behind the other.
+    ///
+    /// # Errors
+    /// If HDF5 refuses or the disk is full.
+    ///
+    /// # Panics
+    /// If there is no state.
+    pub fn states<T: Number>(&self, name: &str, width: usize, states: &[&[T]]) -> Result<(), String> {
+        let count = (states[0].len() / width) as u64;
         let counts = all_gather_u64(self.comm, &[count]);
-        let begin = counts[..self.comm.rank()].iter().sum();
-        let total = counts.iter().sum::<u64>() as usize;
-        let shape = if width == 1 { vec![total] } else { vec![total, width] };
+        let begin: u64 = counts[..self.comm.rank()].iter().sum();
+        let total: u64 = counts.iter().sum();
+        let all = total as usize * states.len();
+        let shape = if width == 1 { vec![all] } else { vec![all, width] };
         let dataset =
             self.dataset(name, || self.file.new_dataset::<T>().obj_track_times(false).shape(shape).create(name))?;
-        // Safety: numbers may be seen as bytes.
-        let bytes = unsafe { std::slice::from_raw_parts(mine.as_ptr().cast::<u8>(), size_of_val(mine)) };
-        agree(self.comm, name, self.transfer(&dataset, begin, count, bytes))
+        for (state, mine) in (0_u64..).zip(states) {
+            // Safety: numbers may be seen as bytes.
+            let bytes = unsafe { std::slice::from_raw_parts(mine.as_ptr().cast::<u8>(), size_of_val(*mine)) };
+            agree(self.comm, name, self.transfer(&dataset, state * total + begin, count, bytes))?;
+        }
+        Ok(())
     }
 
     /// Writes a text, the same on every rank, as a scalar dataset of a UTF-8 string of fixed length.

@@ -1,6 +1,7 @@
 //! One rank's part of the results: a mesh and the fields on it.
 //!
-//! Numbering is the piece's own: connectivity counts from the piece's first point. No field is interpreted here.
+//! Numbering is the piece's own: connectivity counts from the piece's first point. The mesh stays, fields may change from
+//! one time to the next. No field is interpreted here.
 
 use crate::comm::Comm;
 
@@ -15,6 +16,8 @@ pub struct Piece {
     pub offsets: Vec<u64>,
     /// VTK's type of each cell: 10 tetrahedron, 12 hexahedron.
     pub types: Vec<u8>,
+    /// When the states of the fields were recorded, ascending.
+    pub times: Vec<f64>,
     /// Fields with one row a point.
     pub point_data: Vec<Field>,
     /// Fields with one row a cell.
@@ -28,8 +31,8 @@ pub struct Field {
     pub name: String,
     /// Numbers a row.
     pub components: usize,
-    /// Row after row.
-    pub values: Values,
+    /// Row after row: one state, which is that of all times, or one a time.
+    pub states: Vec<Values>,
 }
 
 /// The numbers of a field.
@@ -44,17 +47,23 @@ pub enum Values {
 impl Field {
     /// A field of one real number a row.
     pub fn scalar(name: &str, values: Vec<f64>) -> Self {
-        Self { name: name.into(), components: 1, values: Values::Real(values) }
+        Self { name: name.into(), components: 1, states: vec![Values::Real(values)] }
     }
 
     /// A field of three real numbers a row.
     pub fn vector(name: &str, values: &[[f64; 3]]) -> Self {
-        Self { name: name.into(), components: 3, values: Values::Real(values.as_flattened().to_vec()) }
+        Self { name: name.into(), components: 3, states: vec![Values::Real(values.as_flattened().to_vec())] }
     }
 
     /// A field of one integer a row.
     pub fn integer(name: &str, values: Vec<i64>) -> Self {
-        Self { name: name.into(), components: 1, values: Values::Integer(values) }
+        Self { name: name.into(), components: 1, states: vec![Values::Integer(values)] }
+    }
+}
+
+impl Field {
+    fn kind(&self) -> &'static str {
+        self.states.first().map_or("empty", Values::kind)
     }
 }
 
@@ -63,6 +72,22 @@ impl Values {
         match self {
             Self::Real(values) => values.len(),
             Self::Integer(values) => values.len(),
+        }
+    }
+
+    /// The numbers, if they are real.
+    pub fn real(&self) -> Option<&[f64]> {
+        match self {
+            Self::Real(values) => Some(values),
+            Self::Integer(_) => None,
+        }
+    }
+
+    /// The numbers, if they are integers.
+    pub fn integer(&self) -> Option<&[i64]> {
+        match self {
+            Self::Real(_) => None,
+            Self::Integer(values) => Some(values),
         }
     }
 
@@ -83,17 +108,30 @@ impl Piece {
     /// Bytes that the arrays take in a file, and a little more.
     pub fn bytes(&self) -> u64 {
         const DESCRIPTIONS: usize = 4096;
-        let fields: usize = self.point_data.iter().chain(&self.cell_data).map(|field| field.values.len()).sum();
+        let fields: usize =
+            self.point_data.iter().chain(&self.cell_data).flat_map(|field| &field.states).map(Values::len).sum();
         let numbers = 3 * self.points.len() + self.connectivity.len() + self.offsets.len() + fields;
         (8 * numbers + self.types.len() + DESCRIPTIONS) as u64
     }
 
     /// Names, widths and kinds of all fields: the same text on every rank.
     pub fn layout(&self) -> String {
-        let describe = |fields: &[Field]| -> Vec<String> {
-            fields.iter().map(|f| format!("{} ({} {})", f.name, f.components, f.values.kind())).collect()
-        };
-        format!("points: {}; cells: {}", describe(&self.point_data).join(", "), describe(&self.cell_data).join(", "))
+        let describe = |f: &Field| format!("{} ({} {} x {})", f.name, f.components, f.kind(), f.states.len());
+        let list = |fields: &[Field]| fields.iter().map(describe).collect::<Vec<_>>().join(", ");
+        format!("{} times; points: {}; cells: {}", self.times.len(), list(&self.point_data), list(&self.cell_data))
+    }
+
+    /// Adds the states that fields have at a time.
+    pub fn record(&mut self, time: f64, point_data: Vec<Field>, cell_data: Vec<Field>) {
+        self.times.push(time);
+        for (fields, new) in [(&mut self.point_data, point_data), (&mut self.cell_data, cell_data)] {
+            for field in new {
+                match fields.iter_mut().find(|known| known.name == field.name) {
+                    Some(known) => known.states.extend(field.states),
+                    None => fields.push(field),
+                }
+            }
+        }
     }
 
     /// Whether the arrays belong together.
@@ -113,9 +151,15 @@ impl Piece {
         }
         let fields = self.point_data.iter().map(|f| (f, points)).chain(self.cell_data.iter().map(|f| (f, cells)));
         for (field, rows) in fields {
-            if field.components == 0 || field.values.len() != rows * field.components {
-                let (name, length, width) = (&field.name, field.values.len(), field.components);
-                return Err(format!("field {name} has {length} values for {rows} rows of {width}"));
+            let (name, width, states) = (&field.name, field.components, field.states.len());
+            if states != 1 && states != self.times.len() {
+                return Err(format!("field {name} has {states} states at {} times", self.times.len()));
+            }
+            if let Some(wrong) = field.states.iter().find(|s| width == 0 || s.len() != rows * width) {
+                return Err(format!("field {name} has {} values for {rows} rows of {width}", wrong.len()));
+            }
+            if field.states.iter().any(|state| state.kind() != field.kind()) {
+                return Err(format!("field {name} has real and integer states"));
             }
         }
         Ok(())
@@ -137,20 +181,16 @@ impl Piece {
 
     /// The same fields without rows.
     fn emptied(&self) -> Self {
-        let empty = |fields: &[Field]| -> Vec<Field> {
-            fields
-                .iter()
-                .map(|f| Field {
-                    name: f.name.clone(),
-                    components: f.components,
-                    values: match f.values {
-                        Values::Real(_) => Values::Real(Vec::new()),
-                        Values::Integer(_) => Values::Integer(Vec::new()),
-                    },
-                })
-                .collect()
+        let no_values = |values: &Values| match values {
+            Values::Real(_) => Values::Real(Vec::new()),
+            Values::Integer(_) => Values::Integer(Vec::new()),
         };
-        Self { point_data: empty(&self.point_data), cell_data: empty(&self.cell_data), ..Self::default() }
+        let empty = |fields: &[Field]| -> Vec<Field> {
+            let states = |f: &Field| f.states.iter().map(no_values).collect();
+            fields.iter().map(|f| Field { name: f.name.clone(), components: f.components, states: states(f) }).collect()
+        };
+        let (point_data, cell_data) = (empty(&self.point_data), empty(&self.cell_data));
+        Self { times: self.times.clone(), point_data, cell_data, ..Self::default() }
     }
 
     /// Everything but names as one row of numbers, bit by bit.
@@ -160,8 +200,8 @@ impl Piece {
         packed.extend(&self.connectivity);
         packed.extend(&self.offsets);
         packed.extend(self.types.iter().map(|&t| u64::from(t)));
-        for field in self.point_data.iter().chain(&self.cell_data) {
-            match &field.values {
+        for values in self.point_data.iter().chain(&self.cell_data).flat_map(|field| &field.states) {
+            match values {
                 Values::Real(values) => packed.extend(values.iter().map(|x| x.to_bits())),
                 Values::Integer(values) => packed.extend(values.iter().map(|&i| i as u64)),
             }
@@ -179,10 +219,12 @@ impl Piece {
         self.types.extend(packed.by_ref().take(cells).map(|t| t as u8));
         let fields = self.point_data.iter_mut().map(|f| (f, points));
         for (field, rows) in fields.chain(self.cell_data.iter_mut().map(|f| (f, cells))) {
-            let numbers = packed.by_ref().take(rows * field.components);
-            match &mut field.values {
-                Values::Real(values) => values.extend(numbers.map(f64::from_bits)),
-                Values::Integer(values) => values.extend(numbers.map(|i| i as i64)),
+            for state in &mut field.states {
+                let numbers = packed.by_ref().take(rows * field.components);
+                match state {
+                    Values::Real(values) => values.extend(numbers.map(f64::from_bits)),
+                    Values::Integer(values) => values.extend(numbers.map(|i| i as i64)),
+                }
             }
         }
         sizes

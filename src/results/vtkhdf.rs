@@ -3,7 +3,8 @@
 //! Format: "VTKHDF file format", docs.vtk.org, version 2.2 (the first that allows other groups next to `/VTKHDF`),
 //! read by VTK 9.3 and ParaView 5.12 or newer. Written by all ranks with collective transfers; where the ranks are not
 //! MPI processes, rank 0 gathers everything and writes the same file alone.
-//! One state, no time series: that would be a group `Steps` with offsets into the same arrays.
+//! Several states make a time series: the arrays of the fields that change hold one state behind the other, and the group
+//! `Steps` says where each begins; the mesh is that of all times. One state has no such group.
 
 use std::path::Path;
 
@@ -76,6 +77,9 @@ fn write_rows(
         put_mesh(&file, rows, sizes)?;
         put_fields(&file, "VTKHDF/PointData", &rows.point_data)?;
         put_fields(&file, "VTKHDF/CellData", &rows.cell_data)?;
+        if rows.times.len() > 1 {
+            put_steps(comm, &file, rows, sizes)?;
+        }
         put_records(comm, &file, records)?;
         file.close()?;
     }
@@ -98,11 +102,41 @@ fn put_mesh(file: &SharedFile, rows: &Piece, sizes: &[[usize; 3]]) -> Result<(),
 
 fn put_fields(file: &SharedFile, group: &str, fields: &[Field]) -> Result<(), String> {
     file.group(group)?;
-    for Field { name, components, values } in fields {
+    for Field { name, components, states } in fields {
         let name = format!("{group}/{name}");
-        match values {
-            Values::Real(values) => file.rows(&name, *components, values)?,
-            Values::Integer(values) => file.rows(&name, *components, values)?,
+        let real: Vec<&[f64]> = states.iter().filter_map(Values::real).collect();
+        let integer: Vec<&[i64]> = states.iter().filter_map(Values::integer).collect();
+        if integer.is_empty() {
+            file.states(&name, *components, &real)?;
+        } else {
+            file.states(&name, *components, &integer)?;
+        }
+    }
+    Ok(())
+}
+
+/// Where each time finds its values; the mesh begins at 0 for all of them.
+fn put_steps(comm: &dyn Comm, file: &SharedFile, rows: &Piece, sizes: &[[usize; 3]]) -> Result<(), String> {
+    let count = rows.times.len();
+    let mine = |values: Vec<i64>| if comm.rank() == 0 { values } else { Vec::new() };
+    let repeated = |value: usize| mine(vec![value as i64; count]);
+    let pieces = all_gather_u64(comm, &[sizes.len() as u64]).iter().sum::<u64>() as usize;
+    file.group("VTKHDF/Steps")?;
+    file.attribute("VTKHDF/Steps", "NSteps", &[count as i64])?;
+    file.rows("VTKHDF/Steps/Values", 1, if comm.rank() == 0 { &rows.times[..] } else { &[] })?;
+    file.rows("VTKHDF/Steps/NumberOfParts", 1, &repeated(pieces))?;
+    for name in ["PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"] {
+        file.rows(&format!("VTKHDF/Steps/{name}"), 1, &repeated(0))?;
+    }
+    for (group, fields, column) in [("Point", &rows.point_data, 0), ("Cell", &rows.cell_data, 1)] {
+        let here: u64 = sizes.iter().map(|row| row[column] as u64).sum();
+        let total = all_gather_u64(comm, &[here]).iter().sum::<u64>() as i64;
+        let group = format!("VTKHDF/Steps/{group}DataOffsets");
+        file.group(&group)?;
+        for field in fields {
+            let stride = if field.states.len() > 1 { total } else { 0 };
+            let offsets = (0..count as i64).map(|time| time * stride).collect();
+            file.rows(&format!("{group}/{}", field.name), 1, &mine(offsets))?;
         }
     }
     Ok(())
@@ -150,7 +184,7 @@ mod tests {
     /// Five subdomains spread over the ranks, the last rank without any if there is more than one.
     fn piece(comm: &dyn Comm) -> Piece {
         let owners = (comm.size() - 1).max(1);
-        let mut piece = Piece { offsets: vec![0], ..Piece::default() };
+        let mut piece = Piece { offsets: vec![0], times: vec![1.0], ..Piece::default() };
         let mut subdomain = Vec::new();
         for s in (0..5).filter(|s| s * owners / 5 == comm.rank()) {
             column(&mut piece, s);
@@ -207,6 +241,48 @@ mod tests {
     }
 
     #[test]
+    fn a_series_holds_one_state_behind_the_other_for_every_number_of_ranks() {
+        let directory = tempfile::tempdir().unwrap();
+        for ranks in [1, 3, 5] {
+            let path = directory.path().join(format!("{ranks}.vtkhdf"));
+            threads::run(ranks, |comm| {
+                let mut series = piece(comm);
+                for (time, shift) in [(1.5, 10.0), (4.0, 20.0)] {
+                    let moved: Vec<_> = series.points.iter().map(|p| p.map(|x| x + shift)).collect();
+                    series.record(time, vec![Field::vector("displacement", &moved)], Vec::new());
+                }
+                write(comm, &path, &series, &Records::default()).unwrap();
+            });
+            let file = File::open(&path).unwrap();
+            let reals = |name: &str| file.dataset(&format!("VTKHDF/{name}")).unwrap().read_raw::<f64>().unwrap();
+            let integers = |name: &str| file.dataset(&format!("VTKHDF/{name}")).unwrap().read_raw::<i64>().unwrap();
+            assert_eq!(reals("Steps/Values"), [1.0, 1.5, 4.0]);
+            assert_eq!(integers("Steps/NumberOfParts"), [ranks as i64; 3]);
+            for name in ["PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"] {
+                assert_eq!(integers(&format!("Steps/{name}")), [0; 3]);
+            }
+            assert_eq!(integers("Steps/PointDataOffsets/displacement"), [0, 60, 120]);
+            assert_eq!(integers("Steps/PointDataOffsets/contact_gap"), [0; 3]);
+            assert_eq!(integers("Steps/CellDataOffsets/subdomain"), [0; 3]);
+            let points = reals("Points");
+            let expected = [0.0, 10.0, 20.0].into_iter().flat_map(|shift| points.iter().map(move |x| x + shift));
+            assert!(reals("PointData/displacement").into_iter().eq(expected), "{ranks} ranks");
+            assert_eq!(reals("PointData/contact_gap").len(), 60);
+        }
+    }
+
+    #[test]
+    fn a_field_has_one_state_or_one_a_time() {
+        let mut series = piece(&Solo);
+        for time in [2.0, 3.0] {
+            series.record(time, Vec::new(), Vec::new());
+        }
+        let again = series.point_data[1].states[0].clone();
+        series.point_data[1].states.push(again);
+        assert!(series.check().is_err_and(|error| error == "field contact_gap has 2 states at 3 times"));
+    }
+
+    #[test]
     fn texts_and_type_read_back() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.vtkhdf");
@@ -232,7 +308,7 @@ mod tests {
                 let below_a_file = write(comm, &path.join("b.vtkhdf"), &piece(comm), &Records::default());
                 let mut other = piece(comm);
                 if comm.rank() == ranks - 1 {
-                    other.cell_data[0].values = Values::Integer(vec![0; 99]);
+                    other.cell_data[0].states = vec![Values::Integer(vec![0; 99])];
                 }
                 let inconsistent = write(comm, &path, &other, &Records::default());
                 let mut other = piece(comm);
