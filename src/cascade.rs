@@ -119,7 +119,7 @@ pub fn costs<'a>(
     let mut yielding = HashSet::new();
     for (subdomain, u) in subdomains.iter().zip(u) {
         let (body, brick) = (subdomain.body, brick(&bodies[subdomain.body]));
-        for nodes in internal::yielding(subdomain, material(body), u) {
+        for nodes in internal::yielding(subdomain, material(body), &[], u) {
             let centre = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>() / 4.0;
             let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);
             yielding.insert(numbers[body][boxes.around(body, place)] as u64);

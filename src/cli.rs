@@ -101,10 +101,10 @@ pub enum Cascade {
 }
 
 impl Cascade {
-    /// The levels to solve before `level`, coarsest first.
+    /// The levels to solve before `level`, coarsest first. None where there is a history: a coarser level knows its end.
     fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
         let linear = scene.contact.is_empty() && scene.material.values().all(|m| m.yield_stress.is_none());
-        if self == Self::Off || (self == Self::Auto && linear) {
+        if self == Self::Off || !scene.step.is_empty() || (self == Self::Auto && linear) {
             return Vec::new();
         }
         let half = |l: &usize| (*l > 1).then(|| l.div_ceil(2));
@@ -277,7 +277,7 @@ fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
 
     let converged = summary.converged == Some(true);
     monitor.event(&Event::Phases(table.clone()));
-    monitor.event(&Event::Residuals(summary.residuals));
+    monitor.event(&Event::Residuals(summary.state.residuals));
     monitor.event(&Event::Outcome {
         converged,
         newton_iterations: summary.newton_iterations.unwrap_or_default(),

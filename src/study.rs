@@ -1,15 +1,17 @@
 //! The pipeline from a scene to results: the only file that sees every stage.
 
-use std::cell::RefCell;
+mod conditions;
+
+use std::cell::{Cell, RefCell};
 use std::time::SystemTime;
 
 use thiserror::Error;
 
-use crate::assembly::loads::{self, Traction};
+use crate::assembly::loads::Traction;
 use crate::bodies::{self, MeshError, Meshes};
 use crate::cascade;
 use crate::comm::{Comm, Shares, all_gather_u64, ordered_sum};
-use crate::constraint::{ConstraintError, Constraints, Kind, Support, dirichlet};
+use crate::constraint::{Constraints, Kind, Support, dirichlet};
 use crate::contact::surface::GatheredSurface;
 use crate::contact::{ContactError, ContactPair, matching, mortar, rigid};
 use crate::decomposition::bricks::Boxes;
@@ -31,15 +33,18 @@ use crate::material::Material;
 use crate::mesh::Face;
 use crate::monitor::events::Event;
 use crate::monitor::timing::{Timer, peak_rss_mb};
-use crate::newton::{self, Method, ProgramSettings, Settings, Solution, StepRecord, StepSolver, TornProblem, Watch};
+use crate::newton::loading::{self, At, Followed, Progress};
+use crate::newton::{
+    self, Committed, Method, ProgramSettings, Settings, Solution, StepRecord, StepSolver, TornProblem, Watch,
+};
 use crate::qp::mprgp::Expansion;
-use crate::results::agree::agree;
 use crate::results::fields::{self, ContactState};
 use crate::results::piece::Piece;
-use crate::results::summary::{Counters, NewtonRow, Residuals, Sizes, Summary};
+use crate::results::summary::{Counters, NewtonRow, Residuals, Sizes, State, StepRow, Summary};
 use crate::results::vtkhdf::Records;
 use crate::results::{provenance, summary};
 use crate::scene::{self, Scene, SurfaceName};
+pub use conditions::RightHandSides;
 
 /// Why a scene has no discrete problem; the same on every rank.
 #[derive(Debug, Error)]
@@ -84,6 +89,8 @@ pub struct Discrete {
     pub touching: Vec<usize>,
     /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
     pub reading_mb: Option<f64>,
+    /// Their right-hand sides over the load history.
+    pub right_hand_sides: RightHandSides,
 }
 
 /// Discretises a scene. Collective.
@@ -150,10 +157,10 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
         });
     }
     let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
-    let constraints: Result<_, ConstraintError> = Constraints::new(comm, &decomposition, &supports, &pairs);
-    let constraints = agree(comm, "supports", constraints).map_err(StudyError::Supports)?;
     let contacts: Vec<String> = scene.contact.keys().cloned().collect();
-    refuse_held(comm, &contacts, &pairs, &constraints)?;
+    let given =
+        conditions::Given { decomposition: &decomposition, supports: &supports, contacts: &contacts, pairs: &pairs };
+    let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given)?;
     Ok(Discrete {
         bodies,
         materials,
@@ -167,6 +174,7 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
         warnings,
         touching,
         reading_mb,
+        right_hand_sides,
     })
 }
 
@@ -350,15 +358,14 @@ pub fn solve(
         scene::Preconditioner::Lumped => Some(Preconditioner::new(&gather, schur(None))),
         scene::Preconditioner::Dirichlet => Some(Preconditioner::new(&gather, schur(Some(precision)))),
     };
-    let mut loads = gather.zeros();
-    for (subdomain, f) in subdomains.iter().zip(&mut loads) {
-        loads::add_tractions(subdomain, &discrete.tractions, f);
-    }
-    let problem = TornProblem {
+    let (loading::Conditions { loads, rhs }, stages) = conditions::stages(scene, discrete, &|| gather.zeros());
+    let mut problem = TornProblem {
         subdomains,
         materials: subdomains.iter().map(|s| discrete.materials[s.body]).collect(),
         modes: &modes,
         loads,
+        rhs,
+        committed: Committed::default(),
         constraints,
         gather: &gather,
         coupling: RefCell::new(Coupling::new(constraints)),
@@ -383,23 +390,81 @@ pub fn solve(
     let alive = |step, applications| {
         report.borrow_mut()(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });
     };
-    let step = |record: &StepRecord| report.borrow_mut()(Event::NewtonStep(newton_row(record)));
+    let number = Cell::new(1);
+    let step = |record: &StepRecord| report.borrow_mut()(Event::NewtonStep(newton_row(number.get(), record)));
     let watch = Watch { timer, alive: &alive, step: &step };
-    let solution = newton::solve(&problem, &mut steps, &settings, start, &watch);
+    // A scene that has a start has no history: the right-hand sides at its beginning are those of its end.
+    let start = start.map(|mut start| {
+        problem.make_admissible(&mut start.u);
+        start
+    });
+    let mut piece = fields::mesh(subdomains, comm.rank());
+    let (mut rows, mut closed): (Vec<StepRow>, Vec<u64>) = Default::default();
+    let mut tell = |problem: &TornProblem, progress: Progress| match progress {
+        Progress::Attempt(at) => {
+            number.set(at.number);
+            place(scene, at).into_iter().for_each(|place| report.borrow_mut()(Event::Increment(place)));
+        }
+        Progress::Halved(at, outcome) => {
+            let (place, reason) = (place(scene, at).unwrap_or_default(), outcome.message().unwrap_or_default());
+            report.borrow_mut()(Event::Warning(format!("{place}: {reason}; the increment is halved")));
+        }
+        Progress::Solution(at, solution) => {
+            let contact = contact_states(problem, solution);
+            fields::record(&mut piece, at.time(), problem, &solution.u, &discrete.pairs, &contact);
+            rows.push(step_row(scene, discrete, problem, at, solution, &contact));
+            closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
+        }
+    };
+    let followed = loading::follow(&mut problem, &mut steps, &settings, start, stages, &watch, &mut tell);
 
-    let contact = contact_states(&problem, &solution);
-    let piece = fields::piece(decomposition, &discrete.materials, &solution.u, &discrete.pairs, &contact, comm.rank());
-    let summary = summarise(scene, discrete, &problem, &solution, &contact, comm);
+    let summary = summarise(scene, discrete, &followed, rows, comm);
     let records = Records {
         provenance: provenance::collect(comm, &scene.to_toml(), shares, started),
         convergence: convergence(&summary.newton),
     };
-    let closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
-    Ok(Solved { summary, piece, records, u: solution.u, closed })
+    Ok(Solved { summary, piece, records, u: followed.solution.u, closed })
 }
 
-fn newton_row(record: &StepRecord) -> NewtonRow {
+/// Where in the history an attempt leads, in words; scenes without `[[step]]` have no history to speak of.
+fn place(scene: &Scene, at: At) -> Option<String> {
+    let step = scene.step.get(at.stage)?;
+    let mut text = format!("load step {}", at.stage + 1);
+    if !step.name.is_empty() {
+        text += &format!(" ({})", step.name);
+    }
+    if step.increments > 1 {
+        text += &format!(", increment {} of {}", at.increment, step.increments);
+    }
+    if at.fraction != at.increment as f64 / step.increments as f64 {
+        text += &format!(", up to {:.4} of the step", at.fraction);
+    }
+    Some(text)
+}
+
+/// An increment in numbers.
+fn step_row(
+    scene: &Scene,
+    discrete: &Discrete,
+    problem: &TornProblem,
+    at: At,
+    solution: &Solution,
+    contact: &[ContactState],
+) -> StepRow {
+    StepRow {
+        step: at.stage as u64 + 1,
+        name: scene.steps()[at.stage].name.clone(),
+        increment: at.increment as u64,
+        time: at.time(),
+        halvings: at.halvings as u64,
+        converged: solution.outcome == newton::Outcome::Converged,
+        state: state(discrete, problem, solution, contact),
+    }
+}
+
+fn newton_row(increment: usize, record: &StepRecord) -> NewtonRow {
     NewtonRow {
+        increment: increment as u64,
         step: record.number as u64,
         criterion: record.criterion,
         residual: record.residual,
@@ -414,10 +479,12 @@ fn newton_row(record: &StepRecord) -> NewtonRow {
     }
 }
 
-/// The Newton steps as columns of a table.
+/// The Newton steps as columns of a table; with more than one increment the first says which.
 fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
     let column = |name: &str, value: fn(&NewtonRow) -> f64| (name.to_owned(), rows.iter().map(value).collect());
-    vec![
+    let several = rows.iter().any(|row| row.increment > 1);
+    let increment = several.then(|| column("increment", |r| r.increment as f64));
+    let columns = [
         column("criterion", |r| r.criterion),
         column("residual", |r| r.residual),
         column("damping", |r| r.damping),
@@ -426,7 +493,8 @@ fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
         column("active_contacts", |r| r.active_contacts as f64),
         column("hessian_multiplications", |r| r.hessian_multiplications as f64),
         column("factorisations", |r| r.factorisations as f64),
-    ]
+    ];
+    increment.into_iter().chain(columns).collect()
 }
 
 /// Contact of every pair whose row is on this rank.
@@ -441,28 +509,21 @@ fn contact_states(problem: &TornProblem, solution: &Solution) -> Vec<ContactStat
 }
 
 /// The numbers of a run; what belongs to the whole run (times, scene name, ranks) is filled in by the caller.
-fn summarise(
-    scene: &Scene,
-    discrete: &Discrete,
-    problem: &TornProblem,
-    solution: &Solution,
-    contact: &[ContactState],
-    comm: &dyn Comm,
-) -> Summary {
+fn summarise(scene: &Scene, discrete: &Discrete, followed: &Followed, rows: Vec<StepRow>, comm: &dyn Comm) -> Summary {
+    let Followed { solution, steps, failure } = followed;
     let sizes = sizes(discrete, comm);
-    let space = problem.space;
-    let reactions = problem.reactions(&solution.u, &solution.lambda, discrete.supports.len());
-    let contact_forces = contact_forces(problem, discrete, contact);
-    let names = discrete.supports.iter().map(|s| s.name.clone());
-    let maximum = |x: f64| space.maximum(x);
-    let total = |count: fn(&StepRecord) -> usize| Some(solution.steps.iter().map(count).sum::<usize>() as u64);
+    let state = rows.last().map(|row| row.state.clone()).unwrap_or_default();
+    let total = |count: fn(&StepRecord) -> usize| Some(steps.iter().map(|(_, s)| count(s)).sum::<usize>() as u64);
+    let message = |(at, outcome): &(At, newton::Outcome)| {
+        let message = outcome.message()?;
+        Some(place(scene, *at).map_or(message.clone(), |place| format!("{place}: {message}")))
+    };
     Summary {
         title: scene.title.clone(),
-        converged: Some(solution.outcome == newton::Outcome::Converged),
-        plastic_elements: Some(solution.plastic_elements as u64),
+        converged: Some(failure.is_none()),
         plastic_fraction: Some(solution.plastic_elements as f64 / sizes.elements as f64),
-        newton_iterations: Some(solution.steps.len() as u64),
-        qp: qp_name(scene, problem.constraints.has_inequalities).to_owned(),
+        newton_iterations: Some(steps.len() as u64),
+        qp: qp_name(scene, discrete.constraints.has_inequalities).to_owned(),
         counters: Counters {
             smalse_iterations: total(|s| s.statistics.outer),
             active_set_iterations: total(|s| s.statistics.sets),
@@ -471,6 +532,23 @@ fn summarise(
             preconditioner_applications: total(|s| s.statistics.preconditioner),
             factorisations: total(|s| s.factorisations),
         },
+        error: failure.as_ref().and_then(message),
+        newton: steps.iter().map(|(increment, record)| newton_row(*increment, record)).collect(),
+        steps: rows,
+        state,
+        sizes,
+        ..summary::Summary::default()
+    }
+}
+
+/// What a solution is like. Collective.
+fn state(discrete: &Discrete, problem: &TornProblem, solution: &Solution, contact: &[ContactState]) -> State {
+    let reactions = problem.reactions(&solution.u, &solution.lambda, discrete.supports.len());
+    let contact_forces = contact_forces(problem, discrete, contact);
+    let names = discrete.supports.iter().map(|s| s.name.clone());
+    let maximum = |x: f64| problem.space.maximum(x);
+    State {
+        plastic_elements: Some(solution.plastic_elements as u64),
         active_contacts: Some(problem.active_contacts(&solution.lambda) as u64),
         contact_force: Some(std::array::from_fn(|axis| {
             contact_forces.iter().fold(0.0, |sum, force| sum + force[axis])
@@ -481,21 +559,13 @@ fn summarise(
         internal_energy: Some(solution.internal_energy),
         energy: Some(solution.energy),
         max_displacement: Some(maximum(newton::residuals::largest_displacement(&solution.u))),
-        max_von_mises: Some(maximum(fields::largest_von_mises(
-            &discrete.decomposition,
-            &discrete.materials,
-            &solution.u,
-        ))),
+        max_von_mises: Some(maximum(fields::largest_von_mises(problem, &solution.u))),
         residuals: Residuals {
             equilibrium: Some(solution.residuals.equilibrium),
             gluing: Some(solution.residuals.gluing),
             gap: Some(solution.residuals.gap),
             complementarity: Some(solution.residuals.complementarity),
         },
-        error: solution.outcome.message(),
-        newton: solution.steps.iter().map(newton_row).collect(),
-        sizes,
-        ..summary::Summary::default()
     }
 }
 

@@ -112,6 +112,17 @@ fn a_subdomain_count_out_of_range_is_refused_with_the_range() {
 }
 
 #[test]
+fn steps_that_name_nothing_or_contradict_each_other_are_refused() {
+    assert_override_refused("step=[{support={topp=1}}]", &["step.0.support.topp", "no such support", "lower-back"]);
+    assert_override_refused("step=[{amplitude=nan}]", &["step.0.amplitude", "finite"]);
+    assert_override_refused("step=[{increments=0}]", &["step.0.increments", "at least 1"]);
+    assert_override_refused("step=[{amplitudes=1}]", &["amplitudes", "increments", "halvings"]);
+    let add = "[[step]]\n[[step]]\namplitude = \"none\"\n[decomposition]";
+    assert_text_refused("[decomposition]", add, &["line 49", "none"]);
+    assert_override_refused("material.steel.kinematic_hardening=-1", &["kinematic_hardening", "not negative"]);
+}
+
+#[test]
 fn bad_toml_is_shown_with_line_and_column() {
     assert_text_refused("young = 210000.0", "young = = 210000.0", &["line 8, column"]);
     assert_text_refused("young = 210000.0", "young = \"stiff\"", &["line 8, column", "stiff"]);

@@ -44,6 +44,15 @@ fn a_result_with_an_empty_piece_is_read_back_by_h5py_and_vtk() {
     assert_reads_back(&run);
 }
 
+#[test]
+fn a_time_series_is_read_back_by_h5py_and_vtk_at_every_time() {
+    let steps = "step=[{increments=2}, {amplitude=0}]";
+    assert_reads_back(&solve(2, "patch", &["support.top.displacement.2=-10", steps]).converged());
+    let run = solve(3, "bar", &[steps]).converged();
+    assert_eq!(Fields::times(&run.result()).unwrap(), [0.5, 1.0, 2.0]);
+    assert_reads_back(&run);
+}
+
 /// Keys of a solved scene with contact and plastic material, by type.
 const NUMBERS: [&str; 12] = [
     "plastic_fraction",

@@ -1,9 +1,9 @@
 //! `F(u) = D Psi(u)`: internal forces and energy of a subdomain, and energies in the elastic norm.
 
-use super::{displacements, geometry};
+use super::{committed, displacements, geometry};
 use crate::decomposition::Subdomain;
 use crate::element::tet4::Tet4;
-use crate::material::{History, Material};
+use crate::material::{History, Material, Response};
 use crate::tensor::{Voigt, apply, contract};
 
 /// What one pass over the elements finds.
@@ -41,16 +41,21 @@ impl Terms {
     }
 }
 
-/// Adds the internal forces at `u`, one step from rest, to `forces`.
-pub fn add_forces(subdomain: &Subdomain, material: &Material, u: &[f64], forces: &mut [f64]) -> Internal {
-    let rest = History::default();
+/// Adds the internal forces at `u`, one step from the committed `history`, to `forces`.
+pub fn add_forces(
+    subdomain: &Subdomain,
+    material: &Material,
+    history: &[History],
+    u: &[f64],
+    forces: &mut [f64],
+) -> Internal {
     let modulus = material.lambda() + 2.0 * material.shear_modulus();
     let mut sum = Internal::default();
-    for nodes in &subdomain.elements {
+    for (index, nodes) in subdomain.elements.iter().enumerate() {
         let element = geometry(&subdomain.points, nodes);
         let u = displacements(u, nodes);
         sum.terms.add(&element, modulus, &u);
-        let response = material.respond(&element.strain(&u), &rest);
+        let response = material.respond(&element.strain(&u), committed(history, index));
         sum.energy += element.volume * response.energy;
         sum.plastic += usize::from(response.plastic);
         let mut local = [0.0; 12];
@@ -62,16 +67,37 @@ pub fn add_forces(subdomain: &Subdomain, material: &Material, u: &[f64], forces:
     sum
 }
 
-/// The elements that yield at `u`, one step from rest, by their nodes.
+/// What the elements answer to `u`, one step from the committed `history`.
+pub fn responses<'a>(
+    subdomain: &'a Subdomain,
+    material: &'a Material,
+    history: &'a [History],
+    u: &'a [f64],
+) -> impl Iterator<Item = Response> + 'a {
+    subdomain.elements.iter().enumerate().map(move |(index, nodes)| {
+        let strain = geometry(&subdomain.points, nodes).strain(&displacements(u, nodes));
+        material.respond(&strain, committed(history, index))
+    })
+}
+
+/// Commits the step that ends at `u`.
+pub fn commit(subdomain: &Subdomain, material: &Material, u: &[f64], history: &mut Vec<History>) {
+    history.resize(subdomain.elements.len(), History::default());
+    for (nodes, history) in subdomain.elements.iter().zip(history) {
+        let strain = geometry(&subdomain.points, nodes).strain(&displacements(u, nodes));
+        *history = material.commit(&strain, history);
+    }
+}
+
+/// The elements that yield at `u`, one step from the committed `history`, by their nodes.
 pub fn yielding<'a>(
     subdomain: &'a Subdomain,
     material: &'a Material,
+    history: &'a [History],
     u: &'a [f64],
 ) -> impl Iterator<Item = &'a [u32; 4]> {
-    subdomain.elements.iter().filter(move |nodes| {
-        let element = geometry(&subdomain.points, nodes);
-        material.respond(&element.strain(&displacements(u, nodes)), &History::default()).plastic
-    })
+    let responses = responses(subdomain, material, history, u);
+    subdomain.elements.iter().zip(responses).filter(|(_, response)| response.plastic).map(|(nodes, _)| nodes)
 }
 
 /// `v'K_e v` of each vector (energy).

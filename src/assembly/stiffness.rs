@@ -1,23 +1,30 @@
 //! `K_k`: the consistent tangent of a subdomain; at rest it is the elastic stiffness `K_e`.
 
 use super::pattern::Pattern;
-use super::{displacements, geometry};
+use super::{committed, displacements, geometry};
 use crate::decomposition::Subdomain;
 use crate::material::{History, Material};
 
-/// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from rest. Returns the number of
-/// elements that yield.
-pub fn assemble(subdomain: &Subdomain, material: &Material, u: &[f64], pattern: &Pattern, values: &mut [f64]) -> usize {
+/// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed `history`.
+/// Returns the number of elements that yield.
+pub fn assemble(
+    subdomain: &Subdomain,
+    material: &Material,
+    history: &[History],
+    u: &[f64],
+    pattern: &Pattern,
+    values: &mut [f64],
+) -> usize {
     values.fill(0.0);
     let elastic = material.elastic_tangent();
-    let rest = History::default();
     let mut plastic = 0;
-    for nodes in &subdomain.elements {
+    for (index, nodes) in subdomain.elements.iter().enumerate() {
+        let committed = committed(history, index);
         let element = geometry(&subdomain.shape, nodes);
         let strain = element.strain(&displacements(u, nodes));
-        let k = if material.respond(&strain, &rest).plastic {
+        let k = if material.respond(&strain, committed).plastic {
             plastic += 1;
-            element.stiffness(&material.tangent(&strain, &rest))
+            element.stiffness(&material.tangent(&strain, committed))
         } else {
             element.stiffness(&elastic)
         };

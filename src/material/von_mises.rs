@@ -41,9 +41,10 @@ pub struct Response {
     pub kappa: f64,
 }
 
-/// An excess below this share of the yield stress is round-off: a point that flowed before and is not strained further
-/// answers elastically, whichever side of the yield surface rounding puts it on.
-const ROUNDING: f64 = 1e-12;
+/// An excess below this share of the yield stress is round-off: the tangent of a point that flowed before and is not
+/// strained further is elastic, whichever side of the yield surface rounding puts it on. On fine meshes strains are
+/// differences of large displacements, so the share is well above that of one operation.
+const ROUNDING: f64 = 1e-9;
 
 /// The elastic predictor and how far it is beyond the yield surface.
 struct Trial {
@@ -163,7 +164,7 @@ impl Material {
     /// The history at the end of the step, to be committed once the load step has converged.
     pub fn commit(&self, strain: &Voigt, committed: &History) -> History {
         let trial = Trial::new(self, strain, committed);
-        if !trial.plastic() {
+        if trial.step == 0.0 {
             return *committed;
         }
         let flow = 1.5 * trial.step / trial.equivalent;

@@ -27,6 +27,8 @@ pub enum Event {
         /// All ranks together, in MiB.
         megabytes: f64,
     },
+    /// An increment of the load is tried; where it leads to.
+    Increment(String),
     /// The QP solver is at work; sent as often as it likes.
     Inner {
         /// Newton step, from 1.

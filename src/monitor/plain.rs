@@ -39,6 +39,7 @@ impl Plain {
                 let header = (!std::mem::replace(&mut self.newton_header_written, true)).then(newton_header);
                 header.into_iter().chain([newton_line(row)]).collect()
             }
+            Event::Increment(place) => vec![place.clone()],
             Event::Phases(table) => phase_lines(table),
             Event::Residuals(residuals) => residual_lines(residuals),
             Event::Outcome { converged, newton_iterations, seconds, note } => {
@@ -122,6 +123,7 @@ mod tests {
     fn newton_lines_stand_under_one_header() {
         let mut plain = Plain::default();
         let row = NewtonRow {
+            increment: 1,
             step: 3,
             criterion: 0.0123456,
             residual: 4.5e-7,

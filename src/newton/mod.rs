@@ -3,15 +3,18 @@
 //! `J` is convex and every iterate is made feasible, so the step of the quadratic model is a descent direction and the
 //! method, damped by `J`, converges from anywhere. [`step`] is the only place where FETI and the QP solvers meet.
 
+pub mod committed;
 pub mod damping;
 pub mod dual;
 pub mod forcing;
+pub mod loading;
 pub mod problem;
 pub mod program;
 pub mod recover;
 pub mod residuals;
 pub mod step;
 
+pub use committed::Committed;
 pub use problem::TornProblem;
 pub use program::{Method, ProgramSettings};
 pub use residuals::Residuals;
@@ -140,7 +143,7 @@ pub struct Watch<'a> {
     pub step: &'a dyn Fn(&StepRecord),
 }
 
-/// Solves from rest or from `start`. Collective.
+/// Solves from rest or from `start`, one increment beyond what is committed. Collective.
 pub fn solve(
     problem: &TornProblem,
     solver: &mut StepSolver,
@@ -148,13 +151,11 @@ pub fn solve(
     start: Option<Start>,
     &Watch { timer, alive, step: report }: &Watch,
 ) -> Solution {
+    solver.begin();
     let (mut u, held) = match start {
         Some(Start { u, held }) => (u, Some(held)),
         None => (problem.gather.zeros(), None),
     };
-    if held.is_some() {
-        problem.make_admissible(&mut u);
-    }
     let mut state = problem.evaluate(&u);
     let mut lambda = held.map_or_else(|| vec![0.0; problem.gather.rows()], |held| solver.expect(problem, &state, held));
     let mut residuals = problem.residuals(&u, &state, &lambda);

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use super::committed::Committed;
 use crate::assembly::internal::{self, Terms};
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::Subdomain;
@@ -22,6 +23,10 @@ pub struct TornProblem<'a> {
     pub modes: &'a [RigidModes],
     /// `f`: nodal forces.
     pub loads: Torn,
+    /// `c`: right-hand sides of the rows.
+    pub rhs: Vec<f64>,
+    /// What former increments of the load left behind.
+    pub committed: Committed,
     /// The rows of B.
     pub constraints: &'a Constraints,
     /// B.
@@ -73,7 +78,8 @@ impl TornProblem<'_> {
         let mut partial = Vec::with_capacity(5 * u.len());
         let mut yielding = Vec::with_capacity(u.len());
         for (own, subdomain) in self.subdomains.iter().enumerate() {
-            let found = internal::add_forces(subdomain, &self.materials[own], &u[own], &mut forces[own]);
+            let history = self.committed.history(own);
+            let found = internal::add_forces(subdomain, &self.materials[own], history, &u[own], &mut forces[own]);
             let Terms { energy, force_squares } = found.terms;
             let work = dot(&self.loads[own], &u[own]);
             yielding.push(found.plastic);
@@ -108,6 +114,7 @@ impl TornProblem<'_> {
     }
 
     /// The paper's stopping criterion `|v - u|_e / (|v|_e + |u|_e)`, zero if nothing moves at all. `terms` are those at `v`.
+    /// After an unloading the largest committed displacement is what the change is compared with.
     pub fn relative_change(&self, u: &Torn, v: &Torn, terms: &Terms) -> f64 {
         let mut partial = Vec::with_capacity(3 * u.len());
         for (own, subdomain) in self.subdomains.iter().enumerate() {
@@ -115,7 +122,7 @@ impl TornProblem<'_> {
             partial.extend(internal::elastic_squares(subdomain, &self.materials[own], [&difference, &u[own], &v[own]]));
         }
         let norms: Vec<f64> = self.space.sum(&partial, 3).into_iter().map(f64::sqrt).collect();
-        let size = (norms[1] + norms[2]).max(SIGNIFICANT * terms.energy.sqrt());
+        let size = (norms[1] + norms[2]).max(SIGNIFICANT * terms.energy.sqrt()).max(self.committed.sizes.elastic_norm);
         if norms[0] == 0.0 { 0.0 } else { norms[0] / size }
     }
 
@@ -123,8 +130,8 @@ impl TornProblem<'_> {
     pub fn slack(&self, u: &Torn) -> Vec<f64> {
         let mut slack = vec![0.0; self.gather.rows()];
         self.gather.apply(u, &mut slack);
-        for (s, row) in slack.iter_mut().zip(&self.constraints.rows) {
-            *s = row.rhs - *s;
+        for (s, rhs) in slack.iter_mut().zip(&self.rhs) {
+            *s = rhs - *s;
         }
         slack
     }
@@ -150,8 +157,7 @@ impl TornProblem<'_> {
     /// Whether a displacement satisfies all constraints to round-off.
     pub fn is_admissible(&self, u: &Torn) -> bool {
         let violation = self.violated(self.slack(u));
-        let rhs: Vec<f64> = self.constraints.rows.iter().map(|row| row.rhs).collect();
-        let squares = self.space.dots(&[(&violation, &violation), (&rhs, &rhs)]);
+        let squares = self.space.dots(&[(&violation, &violation), (&self.rhs, &self.rhs)]);
         squares[0] <= f64::EPSILON * squares[1]
     }
 

@@ -64,14 +64,27 @@ pub struct Programs {
     settings: ProgramSettings,
     /// Multipliers of the last step, and the coarse problem of the rows that they act on.
     last: Option<(Vec<f64>, CoarseFace)>,
+    /// The largest first residual of a solve so far.
     reference: Option<f64>,
+    /// Whether the next program is the first of a solve.
+    first: bool,
     norm: Option<f64>,
 }
 
 impl Programs {
     /// Nothing is known yet.
     pub fn new(settings: ProgramSettings) -> Self {
-        Self { settings, last: None, reference: None, norm: None }
+        Self { settings, last: None, reference: None, first: true, norm: None }
+    }
+
+    /// Another solve follows.
+    pub fn begin(&mut self) {
+        self.first = true;
+    }
+
+    /// The last program is no start for the next.
+    pub fn forget(&mut self) {
+        self.last = None;
     }
 
     /// Starts from these multipliers, which act on the held rows; from scratch if these leave a rigid motion free.
@@ -239,9 +252,14 @@ impl Programs {
         Ok(Found { lambda, balanced, outcome, statistics, at_floor })
     }
 
-    /// Keeps the first residual as the reference of all tolerances; says whether that of the scene was aimed at.
+    /// Keeps the first residual of the solve, or a larger one of an earlier solve, as the reference of all tolerances;
+    /// says whether that of the scene was aimed at.
     fn note(&mut self, limits: &Limits, first: f64) -> bool {
-        let reference = *self.reference.get_or_insert(first);
+        let reference = match self.reference {
+            Some(before) if self.first => before.max(first),
+            before => before.unwrap_or(first),
+        };
+        (self.reference, self.first) = (Some(reference), false);
         limits.relative * reference >= limits.drop * first
     }
 }

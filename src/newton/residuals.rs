@@ -3,11 +3,13 @@
 //! With `v = f - F(u) - B_I'lambda_I` and the copies of each node added up, equilibrium asks that what is left at the
 //! unsupported components is zero. Nothing of the dual solver's recurrences is used.
 
+use super::committed::Sizes;
 use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::constraint::Kind;
 use crate::feti::Torn;
 
-/// Relative residuals; all are zero for the exact solution.
+/// Relative residuals; all are zero for the exact solution. What they are relative to is not less than the largest such
+/// value of former increments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residuals {
     /// Euclidean norm of the unbalanced nodal forces over that of the applied or internal nodal forces (or a hundred
@@ -36,9 +38,19 @@ fn relative(a: f64, b: f64) -> f64 {
     if a == 0.0 { 0.0 } else { a / b }
 }
 
+/// The larger one; NaN if the value is.
+fn at_least(bound: f64, value: f64) -> f64 {
+    if bound > value { bound } else { value }
+}
+
 impl TornProblem<'_> {
     /// Residuals at a displacement with the contact part of the multipliers. Collective.
     pub fn residuals(&self, u: &Torn, state: &State, lambda: &[f64]) -> Residuals {
+        self.measure(u, state, lambda).0
+    }
+
+    /// The residuals, and sizes but for that in the elastic norm. Collective.
+    pub(super) fn measure(&self, u: &Torn, state: &State, lambda: &[f64]) -> (Residuals, Sizes) {
         let unbalanced = self.unbalanced(state, lambda);
         let mut free = unbalanced.clone();
         self.remove(&mut free, |kind| !matches!(kind, Kind::Contact { .. }));
@@ -64,13 +76,17 @@ impl TornProblem<'_> {
             }
         }
         worst[4] = largest_displacement(u);
-        let [glue, gap, product, force, size] = worst.map(|w| self.space.maximum(w));
-        Residuals {
-            equilibrium: relative(squares[0].sqrt(), squares[1].max(squares[2]).sqrt().max(terms)),
+        let [glue, gap, product, contact_force, displacement] = worst.map(|w| self.space.maximum(w));
+        let force_square = squares[1].max(squares[2]);
+        let before = &self.committed.sizes;
+        let size = at_least(before.displacement, displacement);
+        let residuals = Residuals {
+            equilibrium: relative(squares[0].sqrt(), force_square.max(before.force_square).sqrt().max(terms)),
             gluing: relative(glue, size),
             gap: relative(gap, size),
-            complementarity: relative(product, force * size),
-        }
+            complementarity: relative(product, at_least(before.contact_force, contact_force) * size),
+        };
+        (residuals, Sizes { elastic_norm: 0.0, force_square, displacement, contact_force })
     }
 
     /// `f - F(u) - B_I'lambda_I`, torn: after adding up copies, minus the reactions.

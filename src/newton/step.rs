@@ -92,6 +92,17 @@ impl<'a> StepSolver<'a> {
         lambda
     }
 
+    /// Forgets the multipliers and factors of a solve that failed.
+    pub fn forget(&mut self) {
+        self.programs.forget();
+        self.yielding.fill(None);
+    }
+
+    /// Another solve follows: its tolerances refer to its own first residual where that is larger than earlier ones.
+    pub fn begin(&mut self) {
+        self.programs.begin();
+    }
+
     /// From now on factorises in double precision; false if that was so before.
     pub fn sharpen(&mut self) -> bool {
         let before = self.operator.factors.precision();
@@ -216,10 +227,10 @@ impl<'a> StepSolver<'a> {
                 continue;
             }
             let pattern = &self.operator.factors.symbolic(own).pattern;
-            let material = &problem.materials[own];
+            let (material, history) = (&problem.materials[own], problem.committed.history(own));
             self.assembled.resize(pattern.rows.len(), 0.0);
             let assembled = &mut self.assembled;
-            timer.time("assembly", || stiffness::assemble(subdomain, material, &u[own], pattern, assembled));
+            timer.time("assembly", || stiffness::assemble(subdomain, material, history, &u[own], pattern, assembled));
             let known = self.yielding[own].is_some();
             let change = if known { pattern.difference(&self.tangents[own], assembled) } else { f64::INFINITY };
             if change <= left {

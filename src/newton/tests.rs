@@ -47,13 +47,13 @@ fn all_methods_give_one_solution() {
     let found = METHODS.map(|method| solve(&exact(&method), 2).0);
     for (summary, method) in found.iter().zip(METHODS) {
         assert_eq!(summary.converged, Some(true), "{method:?}: {:?}", summary.error);
-        let (own, first) = (summary.energy.unwrap(), found[0].energy.unwrap());
+        let (own, first) = (summary.state.energy.unwrap(), found[0].state.energy.unwrap());
         assert!((own / first - 1.0).abs() < 1e-10, "{method:?}: {own} {first}");
-        assert_eq!(summary.plastic_elements, found[0].plastic_elements);
-        assert_eq!(summary.active_contacts, found[0].active_contacts);
+        assert_eq!(summary.state.plastic_elements, found[0].state.plastic_elements);
+        assert_eq!(summary.state.active_contacts, found[0].state.active_contacts);
     }
-    assert!(found[0].plastic_elements > Some(10) && found[0].active_contacts > Some(1));
-    assert!(found[0].active_contacts < Some(found[0].sizes.contact_rows), "part of the contact is open");
+    assert!(found[0].state.plastic_elements > Some(10) && found[0].state.active_contacts > Some(1));
+    assert!(found[0].state.active_contacts < Some(found[0].sizes.contact_rows), "part of the contact is open");
 }
 
 #[test]

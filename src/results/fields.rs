@@ -1,11 +1,11 @@
 //! The solution as fields on one rank's mesh: what ParaView shows.
 
 use super::piece::{Field, Piece};
+use crate::assembly::internal;
 use crate::contact::ContactPair;
-use crate::decomposition::{Decomposition, Subdomain};
-use crate::element::tet4::Tet4;
+use crate::decomposition::Subdomain;
 use crate::feti::Torn;
-use crate::material::{History, Material};
+use crate::newton::TornProblem;
 use crate::tensor;
 
 /// VTK's number of a linear tetrahedron.
@@ -22,47 +22,22 @@ pub struct ContactState {
     pub gap: f64,
 }
 
-/// Mesh and fields of a rank's subdomains, one behind the other. `contact` holds the pairs whose slave is here.
-pub fn piece(
-    decomposition: &Decomposition,
-    materials: &[Material],
-    u: &Torn,
-    pairs: &[ContactPair],
-    contact: &[ContactState],
-    rank: usize,
-) -> Piece {
+/// Mesh of a rank's subdomains, one behind the other, with the fields that never change.
+pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
     let mut piece = Piece { offsets: vec![0], ..Piece::default() };
-    let (mut displacement, mut stress, mut plastic) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut pressure, mut gap, mut status) = (Vec::new(), Vec::new(), Vec::new());
     let (mut subdomain_ids, mut bodies) = (Vec::new(), Vec::new());
-    for (subdomain, u) in decomposition.subdomains.iter().zip(u) {
+    for subdomain in subdomains {
         let first = piece.points.len() as u64;
         piece.points.extend(&subdomain.points);
-        displacement.extend(u.chunks_exact(3).map(|u| [u[0], u[1], u[2]]));
-        let slaves = slave_fields(subdomain, pairs, contact);
-        pressure.extend(slaves.pressure);
-        gap.extend(slaves.gap);
-        status.extend(slaves.status);
         for nodes in &subdomain.elements {
             piece.connectivity.extend(nodes.map(|n| first + u64::from(n)));
             piece.offsets.push(piece.connectivity.len() as u64);
             piece.types.push(VTK_TETRA);
-            let (equivalent, kappa) = element_state(subdomain, &materials[subdomain.body], nodes, u);
-            stress.push(equivalent);
-            plastic.push(kappa);
             subdomain_ids.push(subdomain.id as i64);
             bodies.push(subdomain.body as i64);
         }
     }
-    piece.point_data = vec![
-        Field::vector("displacement", &displacement),
-        Field::scalar("contact_pressure", pressure),
-        Field::scalar("contact_gap", gap),
-        Field::integer("contact_status", status),
-    ];
     piece.cell_data = vec![
-        Field::scalar("von_mises", stress),
-        Field::scalar("equivalent_plastic_strain", plastic),
         Field::integer("body", bodies),
         Field::integer("rank", vec![rank as i64; subdomain_ids.len()]),
         Field::integer("subdomain", subdomain_ids),
@@ -70,25 +45,45 @@ pub fn piece(
     piece
 }
 
-/// Largest von Mises stress in this rank's elements.
-pub fn largest_von_mises(decomposition: &Decomposition, materials: &[Material], u: &Torn) -> f64 {
-    let mut largest = 0.0_f64;
-    for (subdomain, u) in decomposition.subdomains.iter().zip(u) {
-        for nodes in &subdomain.elements {
-            let (equivalent, _) = element_state(subdomain, &materials[subdomain.body], nodes, u);
-            largest = if equivalent.is_nan() { equivalent } else { largest.max(equivalent) };
-        }
+/// Adds the solution at a time to the mesh. `contact` holds the pairs whose slave is here.
+pub fn record(
+    piece: &mut Piece,
+    time: f64,
+    problem: &TornProblem,
+    u: &Torn,
+    pairs: &[ContactPair],
+    contact: &[ContactState],
+) {
+    let (mut displacement, mut pressure, mut gap, mut status) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for (subdomain, u) in problem.subdomains.iter().zip(u) {
+        displacement.extend(u.chunks_exact(3).map(|u| [u[0], u[1], u[2]]));
+        let slaves = slave_fields(subdomain, pairs, contact);
+        pressure.extend(slaves.pressure);
+        gap.extend(slaves.gap);
+        status.extend(slaves.status);
     }
-    largest
+    let (stress, plastic) = element_states(problem, u).unzip();
+    let point_data = vec![
+        Field::vector("displacement", &displacement),
+        Field::scalar("contact_pressure", pressure),
+        Field::scalar("contact_gap", gap),
+        Field::integer("contact_status", status),
+    ];
+    let cell_data = vec![Field::scalar("von_mises", stress), Field::scalar("equivalent_plastic_strain", plastic)];
+    piece.record(time, point_data, cell_data);
 }
 
-/// Von Mises stress and equivalent plastic strain of an element, one step from rest.
-fn element_state(subdomain: &Subdomain, material: &Material, nodes: &[u32; 4], u: &[f64]) -> (f64, f64) {
-    let element =
-        Tet4::new(&nodes.map(|n| subdomain.points[n as usize])).expect("elements of a checked mesh have volume");
-    let strain = element.strain(&std::array::from_fn(|k| u[3 * nodes[k / 3] as usize + k % 3]));
-    let response = material.respond(&strain, &History::default());
-    (tensor::von_mises(&response.stress), response.kappa)
+/// Largest von Mises stress in this rank's elements.
+pub fn largest_von_mises(problem: &TornProblem, u: &Torn) -> f64 {
+    element_states(problem, u).fold(0.0_f64, |a, (b, _)| if b.is_nan() || b > a { b } else { a })
+}
+
+/// Von Mises stress and equivalent plastic strain of all elements, one increment from what is committed.
+fn element_states<'a>(problem: &'a TornProblem<'_>, u: &'a Torn) -> impl Iterator<Item = (f64, f64)> + use<'a> {
+    problem.subdomains.iter().zip(u).enumerate().flat_map(|(own, (subdomain, u))| {
+        let (material, history) = (&problem.materials[own], problem.committed.history(own));
+        internal::responses(subdomain, material, history, u).map(|r| (tensor::von_mises(&r.stress), r.kappa))
+    })
 }
 
 /// Contact at the nodes of a subdomain: where a node is in several contacts, the sum of the pressures and the smallest gap.

@@ -30,9 +30,7 @@ pub struct Summary {
     /// Sizes of the problem.
     #[serde(flatten)]
     pub sizes: Sizes,
-    /// Elements with plastic flow in the last step.
-    pub plastic_elements: Option<u64>,
-    /// Their share of all elements, 0 to 1.
+    /// Share of the elements with plastic flow in the last increment, 0 to 1.
     pub plastic_fraction: Option<f64>,
     /// Newton steps.
     pub newton_iterations: Option<u64>,
@@ -41,6 +39,37 @@ pub struct Summary {
     /// Work done by the QP solver.
     #[serde(flatten)]
     pub counters: Counters,
+    /// The state at the end of the run.
+    #[serde(flatten)]
+    pub state: State,
+    /// Wall time of the run in seconds.
+    pub time_total: Option<f64>,
+    /// Seconds of each phase on the slowest rank.
+    pub time: BTreeMap<String, f64>,
+    /// Sum over the ranks of their largest resident memory, in MiB.
+    pub peak_rss_mb: Option<f64>,
+    /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
+    pub mesh_reading_mb: Option<f64>,
+    /// What a run would take, in MiB; from `check` only.
+    pub memory_estimate_mb: Option<f64>,
+    /// Why the run failed.
+    pub error: Option<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// One row an increment of the load.
+    pub steps: Vec<StepRow>,
+    /// One row a Newton step; those of attempts that failed included.
+    pub newton: Vec<NewtonRow>,
+    /// Coarser levels that were solved before for a start, coarsest first.
+    pub cascade: Vec<CascadeRow>,
+}
+
+/// What a solution is like. Energies are those of the last increment: what is stored elastically, and what this increment
+/// dissipates or stores by hardening.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct State {
+    /// Elements with plastic flow in the last increment.
+    pub plastic_elements: Option<u64>,
     /// Contact pairs that transmit pressure.
     pub active_contacts: Option<u64>,
     /// Force on the slave surfaces of all contacts together.
@@ -62,24 +91,26 @@ pub struct Summary {
     /// How well the equations hold.
     #[serde(flatten)]
     pub residuals: Residuals,
-    /// Wall time of the run in seconds.
-    pub time_total: Option<f64>,
-    /// Seconds of each phase on the slowest rank.
-    pub time: BTreeMap<String, f64>,
-    /// Sum over the ranks of their largest resident memory, in MiB.
-    pub peak_rss_mb: Option<f64>,
-    /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
-    pub mesh_reading_mb: Option<f64>,
-    /// What a run would take, in MiB; from `check` only.
-    pub memory_estimate_mb: Option<f64>,
-    /// Why the run failed.
-    pub error: Option<String>,
-    /// What the user should know.
-    pub warnings: Vec<String>,
-    /// One row a Newton step.
-    pub newton: Vec<NewtonRow>,
-    /// Coarser levels that were solved before for a start, coarsest first.
-    pub cascade: Vec<CascadeRow>,
+}
+
+/// The end of an increment.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct StepRow {
+    /// Number of the load step, from 1.
+    pub step: u64,
+    /// Its name.
+    pub name: String,
+    /// Number of the increment in the step, from 1.
+    pub increment: u64,
+    /// Load steps done, that of the present one as a fraction: the time in the result file.
+    pub time: f64,
+    /// How often parts of the increment were halved because Newton's method failed.
+    pub halvings: u64,
+    /// Whether the increment was reached.
+    pub converged: bool,
+    /// The state there.
+    #[serde(flatten)]
+    pub state: State,
 }
 
 /// Sizes of the problem, in the paper's way of counting rows.
@@ -161,6 +192,8 @@ pub struct CascadeRow {
 /// One Newton step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct NewtonRow {
+    /// Number of the increment of the load, from 1.
+    pub increment: u64,
     /// Number, from 1.
     pub step: u64,
     /// The paper's stopping criterion in the energy norm.
@@ -210,15 +243,18 @@ mod tests {
         let path = directory.path().join("new/summary.json");
         let summary = Summary {
             converged: Some(true),
-            energy: Some(-1245323411.382042),
-            max_displacement: Some(0.1 + 0.2),
-            residuals: Residuals { equilibrium: Some(f64::NAN), gluing: Some(5e-324), ..Residuals::default() },
-            reactions: BTreeMap::from([("left".into(), [1.0 / 3.0, -0.0, 1e300])]),
+            state: State {
+                energy: Some(-1245323411.382042),
+                max_displacement: Some(0.1 + 0.2),
+                residuals: Residuals { equilibrium: Some(f64::NAN), gluing: Some(5e-324), ..Residuals::default() },
+                reactions: BTreeMap::from([("left".into(), [1.0 / 3.0, -0.0, 1e300])]),
+                ..State::default()
+            },
             ..Summary::default()
         };
         threads::run(3, |comm| summary.write(comm, &path).unwrap());
         let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-        assert_eq!(read["energy"].as_f64(), summary.energy);
+        assert_eq!(read["energy"].as_f64(), summary.state.energy);
         assert_eq!(read["max_displacement"].as_f64(), Some(0.1 + 0.2));
         assert_eq!(read["residual_gluing"].as_f64(), Some(5e-324));
         assert_eq!(read["reactions"]["left"][0].as_f64(), Some(1.0 / 3.0));

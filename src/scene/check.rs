@@ -13,6 +13,7 @@ use super::error::Fault;
 use super::held::Held;
 use super::material::Material;
 use super::solver::Solver;
+use super::step::Step;
 use super::surface::{Face, Load, Support, SurfaceName};
 
 pub(super) type Checked = Result<(), Fault>;
@@ -27,9 +28,10 @@ pub(super) fn scene(scene: &Scene) -> Checked {
     scene.support.iter().try_for_each(|(name, it)| support(scene, &format!("support.{name}"), it))?;
     scene.load.iter().try_for_each(|(name, it)| load(scene, &format!("load.{name}"), it))?;
     scene.contact.iter().try_for_each(|(name, it)| contact(scene, &format!("contact.{name}"), it))?;
+    scene.step.iter().enumerate().try_for_each(|(index, it)| step(scene, &format!("step.{index}"), it))?;
     decomposition(scene)?;
     solver(&scene.solver)?;
-    compatible_supports(scene)?;
+    scene.steps().iter().try_for_each(|step| compatible_supports(scene, step))?;
     scene.body.keys().try_for_each(|name| holding(scene, name))
 }
 
@@ -159,6 +161,33 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
     }
 }
 
+fn step(scene: &Scene, key: &str, step: &Step) -> Checked {
+    let finite = |key: &str, value: f64| require(value.is_finite(), key, value, "must be a finite number");
+    finite(&format!("{key}.amplitude"), step.amplitude)?;
+    let rule = "must be at least 1 and at most 1000000";
+    require((1..=1_000_000).contains(&step.increments), &format!("{key}.increments"), step.increments, rule)?;
+    require(step.halvings <= 30, &format!("{key}.halvings"), step.halvings, "must be at most 30")?;
+    for (name, &factor) in &step.load {
+        let key = format!("{key}.load.{name}");
+        require(scene.load.contains_key(name), &key, factor, known("load", scene.load.keys()))?;
+        finite(&key, factor)?;
+    }
+    for (name, &factor) in &step.support {
+        let key = format!("{key}.support.{name}");
+        require(scene.support.contains_key(name), &key, factor, known("support", scene.support.keys()))?;
+        finite(&key, factor)?;
+    }
+    Ok(())
+}
+
+/// What to say of a name that is not among those of a section.
+fn known<'a>(section: &str, known: impl Iterator<Item = &'a String>) -> String {
+    match names(known) {
+        none if none.is_empty() => format!("no such {section}: the scene has none"),
+        known => format!("no such {section}: known are {known}"),
+    }
+}
+
 fn decomposition(scene: &Scene) -> Checked {
     match scene.decomposition {
         Decomposition::Auto => Ok(()),
@@ -212,9 +241,9 @@ fn solver(solver: &Solver) -> Checked {
     Ok(())
 }
 
-/// Faces of a brick that are not opposite share nodes, where two supports must not prescribe different values. Surfaces
-/// of mesh files are compared node by node when rows are made.
-fn compatible_supports(scene: &Scene) -> Checked {
+/// Faces of a brick that are not opposite share nodes, where two supports must not prescribe different values at the end
+/// of a step. Surfaces of mesh files are compared node by node when rows are made.
+fn compatible_supports(scene: &Scene, step: &Step) -> Checked {
     for (index, (name, one)) in scene.support.iter().enumerate() {
         for (other_name, other) in scene.support.iter().take(index) {
             let (Some(face), Some(other_face)) = (one.surface.face(), other.surface.face()) else { continue };
@@ -223,6 +252,7 @@ fn compatible_supports(scene: &Scene) -> Checked {
                 && (face == other_face || face.axis() != other_face.axis());
             for axis in Axis::ALL.into_iter().filter(|_| meet) {
                 let (Some(value), Some(other_value)) = (one.prescribed(axis), other.prescribed(axis)) else { continue };
+                let (value, other_value) = (step.of_support(name) * value, step.of_support(other_name) * other_value);
                 if value != other_value {
                     let rule = format!(
                         "prescribes the displacement {value:?} along {axis}, but support.{other_name} prescribes \

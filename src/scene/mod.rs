@@ -17,6 +17,7 @@ mod material;
 mod overrides;
 mod read;
 mod solver;
+mod step;
 mod surface;
 
 use std::collections::BTreeMap;
@@ -31,6 +32,7 @@ pub use error::{Fault, Place, SceneError};
 pub use held::Held;
 pub use material::Material;
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
+pub use step::Step;
 pub use surface::{Face, Load, Support, SurfaceError, SurfaceName};
 
 /// A study: bodies, what holds and loads them, where they touch, how to cut and how to solve.
@@ -53,6 +55,9 @@ pub struct Scene {
     pub load: BTreeMap<String, Load>,
     /// Contacts by name.
     pub contact: BTreeMap<String, Contact>,
+    /// The load history as given; see [`Scene::steps`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub step: Vec<Step>,
     /// How bodies are cut into subdomains.
     pub decomposition: Decomposition,
     /// Methods, tolerances and limits.
@@ -131,6 +136,11 @@ impl Scene {
     /// If a count exceeds TOML's integers (2^63), which no checked scene does.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("the counts of a checked scene fit TOML's integers")
+    }
+
+    /// The load history: one step to the full loads if the scene gives none.
+    pub fn steps(&self) -> &[Step] {
+        if self.step.is_empty() { &step::AT_ONCE } else { &self.step }
     }
 
     /// Surfaces that supports, loads and contacts name, with repetitions.

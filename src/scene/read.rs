@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use toml::Table;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeArray, DeTable};
 
 use super::error::{Place, SceneError};
 use super::{Scene, overrides};
@@ -49,15 +49,23 @@ pub(super) fn place(text: &str, origin: &str, sets: &[String], key: &str) -> Pla
 
 fn position(text: &str, key: &str) -> Option<(usize, usize)> {
     let root = DeTable::parse(text).ok()?;
-    let mut table = root.get_ref();
+    let (mut table, mut rows) = (Some(root.get_ref()), None::<&DeArray>);
     let mut found = None;
     for part in key.split('.') {
-        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == part) else { break };
-        found = Some(line_column(text, name.span()));
-        match value.get_ref() {
-            DeValue::Table(inner) => table = inner,
+        let (span, value) = match (table, rows) {
+            (Some(table), _) => {
+                let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == part) else { break };
+                (name.span(), value)
+            }
+            (_, Some(rows)) => {
+                let row = part.parse::<usize>().ok().and_then(|index| rows.get(index));
+                let Some(row) = row else { break };
+                (row.span(), row)
+            }
             _ => break,
-        }
+        };
+        found = Some(line_column(text, span));
+        (table, rows) = (value.get_ref().as_table(), value.get_ref().as_array());
     }
     found
 }

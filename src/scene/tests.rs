@@ -99,6 +99,8 @@ fn effective_scenes_round_trip() {
     }
     let metis = two_blocks(&["decomposition.subdomains=7", "solver.expansion=fixed"]).unwrap();
     assert_eq!(Scene::from_text(&metis.to_toml(), "echo", 1, &[]).unwrap(), metis);
+    let steps = two_blocks(&["step=[{load={top=0.5}, increments=3}, {name='off', amplitude=0}]"]).unwrap();
+    assert_eq!(Scene::from_text(&steps.to_toml(), "echo", 1, &[]).unwrap(), steps);
 }
 
 #[test]
@@ -162,7 +164,9 @@ fn materials_are_checked() {
         refuses(&[&format!("material.steel.yield_stress={stress}")], &["material.steel.yield_stress = "]);
     }
     for hardening in ["-1", "nan", "inf"] {
-        refuses(&[&format!("material.steel.hardening={hardening}")], &["material.steel.hardening = "]);
+        for key in ["hardening", "kinematic_hardening"] {
+            refuses(&[&format!("material.steel.{key}={hardening}")], &[&format!("material.steel.{key} = ")]);
+        }
     }
 }
 
@@ -315,6 +319,43 @@ fn obstacles_are_checked() {
         says(&field("[1, 1]", heights), &["heightfield.heights", "equal length"]);
     }
     says(&field("[1, 1]", "[[0, 0], [0, nan]]"), &["heightfield.heights", "finite"]);
+}
+
+#[test]
+fn steps_are_checked() {
+    let step = |text: &str| one(&["load.top={surface='block.zmax', traction=[0, 0, 1]}", &format!("step=[{text}]")]);
+    assert_says(step("{amplitude=nan}"), &["step.0.amplitude = NaN", "finite"]);
+    assert_says(step("{}, {increments=0}"), &["step.1.increments = 0", "at least 1"]);
+    assert_says(step("{halvings=31}"), &["step.0.halvings = 31", "at most 30"]);
+    assert_says(step("{load={bottom=1}}"), &["step.0.load.bottom", "no such load", "known are top"]);
+    assert_says(step("{load={top=inf}}"), &["step.0.load.top", "finite"]);
+    assert_says(step("{support={top=1}}"), &["step.0.support.top", "no such support", "known are base"]);
+    assert_says(step("{amplitud=1}"), &["unknown key `amplitud`"]);
+    refuses(&["step=[{load={top=1}}]"], &["no such load", "the scene has none"]);
+    let text = format!("{ONE}[[step]]\n[[step]]\nname = 'off'\namplitude = inf\n");
+    assert_says(Scene::from_text(&text, "one.toml", 1, &[]), &["one.toml, line 18", "step.1.amplitude = inf"]);
+    let changed = Scene::from_text(&text, "one.toml", 1, &sets(&["step.1.amplitude=0"])).unwrap();
+    assert_eq!((changed.step.len(), changed.step[1].amplitude, changed.step[1].name.as_str()), (2, 0.0, "off"));
+}
+
+#[test]
+fn steps_scale_what_they_do_not_name_by_their_amplitude() {
+    let scene = one(&["step=[{amplitude=2, support={base=3}}, {}]"]).unwrap();
+    let [first, second] = scene.steps() else { panic!("two steps") };
+    assert_eq!((first.of_load("any"), first.of_support("base"), first.of_support("other")), (2.0, 3.0, 2.0));
+    assert_eq!((second.of_load("any"), second.increments), (1.0, 1));
+    let at_once = one(&[]).unwrap();
+    let [whole] = at_once.steps() else { panic!("one step") };
+    assert_eq!((whole.of_load("any"), whole.increments, whole.halvings), (1.0, 1, 0));
+}
+
+#[test]
+fn supports_must_agree_in_every_step() {
+    let side = "support.side={surface='block.xmin', fix=['x'], displacement=[1, 0, 0]}";
+    let base = "support.base.displacement=[1, 0, 0]";
+    assert!(one(&[side, base]).is_ok());
+    assert!(one(&[side, base, "step=[{}, {amplitude=0.5}]"]).is_ok());
+    assert_says(one(&[side, base, "step=[{}, {support={side=0.5}}]"]), &["support.side", "0.5 along x", "1.0"]);
 }
 
 #[test]

@@ -2,14 +2,16 @@
 
 use std::path::Path;
 
-use hdf5_metno::{Dataset, File};
+use hdf5_metno::{Dataset, File, H5Type};
 
 /// What closed forms are met to.
 pub const EXACT: f64 = 1e-10;
 
-/// All pieces of a result file, one behind the other.
+/// All pieces of a result file, one behind the other, at one time.
 pub struct Fields {
     file: File,
+    /// Which of the times.
+    time: usize,
     pub points: Vec<[f64; 3]>,
     pub displacement: Vec<[f64; 3]>,
     /// Corners of the elements, as indices into the points.
@@ -17,7 +19,20 @@ pub struct Fields {
 }
 
 impl Fields {
+    /// The only state of a file.
     pub fn read(path: &Path) -> Fields {
+        assert_eq!(Fields::times(path), None, "a time series");
+        Fields::at(path, 0)
+    }
+
+    /// The times of a series.
+    pub fn times(path: &Path) -> Option<Vec<f64>> {
+        let steps = File::open(path).unwrap().dataset("VTKHDF/Steps/Values").ok()?;
+        Some(steps.read_raw().unwrap())
+    }
+
+    /// The state at one of the times.
+    pub fn at(path: &Path, time: usize) -> Fields {
         let file = File::open(path).unwrap();
         let numbers = |name: &str| file.dataset(&format!("VTKHDF/{name}")).unwrap().read_raw::<i64>().unwrap();
         let vectors = |name: &str| {
@@ -34,30 +49,31 @@ impl Fields {
         }
         Fields {
             points: vectors("Points"),
-            displacement: vectors("PointData/displacement"),
+            displacement: state(&file, time, "Point", "displacement").as_chunks::<3>().0.to_vec(),
             elements: connectivity.as_chunks::<4>().0.to_vec(),
             file,
+            time,
         }
     }
 
     /// A field of one real number a point.
     pub fn of_points(&self, name: &str) -> Vec<f64> {
-        self.file.dataset(&format!("VTKHDF/PointData/{name}")).unwrap().read_raw().unwrap()
+        state(&self.file, self.time, "Point", name)
     }
 
     /// A field of one integer a point.
     pub fn integers_of_points(&self, name: &str) -> Vec<i64> {
-        self.file.dataset(&format!("VTKHDF/PointData/{name}")).unwrap().read_raw().unwrap()
+        state(&self.file, self.time, "Point", name)
     }
 
     /// A field of one real number an element.
     pub fn of_elements(&self, name: &str) -> Vec<f64> {
-        self.file.dataset(&format!("VTKHDF/CellData/{name}")).unwrap().read_raw().unwrap()
+        state(&self.file, self.time, "Cell", name)
     }
 
     /// A field of one integer an element.
     pub fn integers_of_elements(&self, name: &str) -> Vec<i64> {
-        self.file.dataset(&format!("VTKHDF/CellData/{name}")).unwrap().read_raw().unwrap()
+        state(&self.file, self.time, "Cell", name)
     }
 
     /// Body number of each point.
@@ -86,6 +102,18 @@ impl Fields {
         }
         all
     }
+}
+
+/// The rows of a field of points or cells at a time.
+fn state<T: H5Type + Clone>(file: &File, time: usize, of: &str, name: &str) -> Vec<T> {
+    let dataset = file.dataset(&format!("VTKHDF/{of}Data/{name}")).unwrap();
+    let width = dataset.shape().get(1).copied().unwrap_or(1);
+    let all = dataset.read_raw().unwrap();
+    let Ok(offsets) = file.dataset(&format!("VTKHDF/Steps/{of}DataOffsets/{name}")) else { return all };
+    let begin = offsets.read_raw::<i64>().unwrap()[time] as usize;
+    let counts = file.dataset(&format!("VTKHDF/NumberOf{of}s")).unwrap().read_raw::<i64>().unwrap();
+    let rows = counts.iter().sum::<i64>() as usize;
+    all[begin * width..][..rows * width].to_vec()
 }
 
 fn bits(dataset: &Dataset) -> Vec<u64> {

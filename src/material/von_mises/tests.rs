@@ -218,7 +218,7 @@ fn potential_of_a_step_is_the_elastic_one_after_it_and_the_plastic_work_of_it() 
 fn a_committed_point_waits() {
     for (material, strain, history) in states() {
         let after = material.commit(&strain, &history);
-        assert_eq!(material.commit(&strain, &after), after);
+        close(material.commit(&strain, &after).kappa, after.kappa, 1e-12);
         assert_eq!(material.tangent(&strain, &after), material.elastic_tangent());
     }
 }

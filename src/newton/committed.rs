@@ -1,0 +1,68 @@
+//! What converged increments leave behind: the history of the material, and how large everything has been.
+
+use super::problem::TornProblem;
+use crate::assembly::internal;
+use crate::feti::Torn;
+use crate::material::History;
+
+/// The state that an increment starts from; by default that of rest.
+#[derive(Default)]
+pub struct Committed {
+    /// History of each element of each own subdomain; none where nothing ever yielded.
+    histories: Vec<Vec<History>>,
+    /// What relative errors refer to where less is left.
+    pub sizes: Sizes,
+}
+
+/// The largest values of the increments so far. An unloaded body keeps errors of the size of what was there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sizes {
+    /// `|u|_e` (root of energy).
+    pub elastic_norm: f64,
+    /// Squared norm of the nodal forces, applied or internal (force squared).
+    pub force_square: f64,
+    /// Largest nodal displacement (length).
+    pub displacement: f64,
+    /// Largest contact force (force).
+    pub contact_force: f64,
+}
+
+impl Sizes {
+    fn larger(self, other: Self) -> Self {
+        Self {
+            elastic_norm: self.elastic_norm.max(other.elastic_norm),
+            force_square: self.force_square.max(other.force_square),
+            displacement: self.displacement.max(other.displacement),
+            contact_force: self.contact_force.max(other.contact_force),
+        }
+    }
+}
+
+impl Committed {
+    /// History of the elements of an own subdomain; empty if nothing ever yielded there.
+    pub fn history(&self, own: usize) -> &[History] {
+        self.histories.get(own).map_or(&[], Vec::as_slice)
+    }
+}
+
+impl TornProblem<'_> {
+    /// Commits a solution: from now on the problem is the next increment. Collective.
+    pub fn commit(&mut self, u: &Torn, lambda: &[f64]) {
+        let state = self.evaluate(u);
+        let sizes = Sizes { elastic_norm: self.elastic_norm(u), ..self.measure(u, &state, lambda).1 };
+        self.committed.sizes = self.committed.sizes.larger(sizes);
+        self.committed.histories.resize_with(u.len(), Vec::new);
+        for (own, history) in
+            self.committed.histories.iter_mut().enumerate().filter(|(own, _)| state.yielding[*own] > 0)
+        {
+            internal::commit(&self.subdomains[own], &self.materials[own], &u[own], history);
+        }
+    }
+
+    /// `|u|_e`. One collective.
+    fn elastic_norm(&self, u: &Torn) -> f64 {
+        let square = |own: usize| internal::elastic_squares(&self.subdomains[own], &self.materials[own], [&u[own]])[0];
+        let partial: Vec<f64> = (0..u.len()).map(square).collect();
+        self.space.sum(&partial, 1)[0].sqrt()
+    }
+}

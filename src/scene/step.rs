@@ -1,0 +1,56 @@
+//! The load history: what part of the loads and prescribed displacements acts at the end of each step.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// A stretch of the load history. Loads and prescribed displacements go in a straight line from their values at the end
+/// of the step before (zero at the beginning) to the ones given here.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Step {
+    /// For headings.
+    pub name: String,
+    /// Factor of all loads and prescribed displacements at the end of the step.
+    pub amplitude: f64,
+    /// Equal parts in which the step is taken; plastic flow is integrated implicitly over each.
+    pub increments: usize,
+    /// How often an increment that does not converge is halved.
+    pub halvings: u32,
+    /// Factors of some loads, by name, instead of `amplitude`.
+    pub load: BTreeMap<String, f64>,
+    /// Factors of some supports' displacements, by name, instead of `amplitude`.
+    pub support: BTreeMap<String, f64>,
+}
+
+/// The history of a scene that gives none: everything at once.
+pub(super) static AT_ONCE: [Step; 1] = [Step::whole(0)];
+
+impl Step {
+    const fn whole(halvings: u32) -> Self {
+        Step {
+            name: String::new(),
+            amplitude: 1.0,
+            increments: 1,
+            halvings,
+            load: BTreeMap::new(),
+            support: BTreeMap::new(),
+        }
+    }
+
+    /// Factor of this load at the end of the step.
+    pub fn of_load(&self, name: &str) -> f64 {
+        self.load.get(name).copied().unwrap_or(self.amplitude)
+    }
+
+    /// Factor of this support's displacement at the end of the step.
+    pub fn of_support(&self, name: &str) -> f64 {
+        self.support.get(name).copied().unwrap_or(self.amplitude)
+    }
+}
+
+impl Default for Step {
+    fn default() -> Self {
+        Step::whole(5)
+    }
+}

@@ -1,0 +1,83 @@
+//! What a scene prescribes at the end of each step of its load history: right-hand sides and nodal loads.
+
+use super::{Discrete, StudyError, refuse_held};
+use crate::assembly::loads::{self, Traction};
+use crate::comm::Comm;
+use crate::constraint::{ConstraintError, Constraints, Support};
+use crate::contact::ContactPair;
+use crate::decomposition::Decomposition;
+use crate::feti::Torn;
+use crate::newton::loading::{Conditions, Stage};
+use crate::results::agree::agree;
+use crate::scene::Scene;
+
+/// Right-hand sides of a rank's rows.
+pub struct RightHandSides {
+    /// At rest: contact gaps are there, prescribed displacements are not.
+    begin: Vec<f64>,
+    /// At the end of each step.
+    ends: Vec<Vec<f64>>,
+}
+
+/// What the rows are made of.
+pub(super) struct Given<'a> {
+    pub decomposition: &'a Decomposition,
+    /// With the displacements that the scene gives.
+    pub supports: &'a [Support],
+    /// Names of the contacts.
+    pub contacts: &'a [String],
+    pub pairs: &'a [ContactPair],
+}
+
+/// The rows of B, and their right-hand sides over the history, which are all that changes. Collective.
+///
+/// # Errors
+/// If supports contradict each other, or violate a contact, in some step.
+pub(super) fn constraints(
+    scene: &Scene,
+    comm: &dyn Comm,
+    &Given { decomposition, supports, contacts, pairs }: &Given,
+) -> Result<(Constraints, RightHandSides), StudyError> {
+    let rows = |factor: &dyn Fn(&str) -> f64| {
+        let scaled = |s: &Support| Support { displacement: s.displacement.map(|d| factor(&s.name) * d), ..s.clone() };
+        let supports: Vec<Support> = supports.iter().map(scaled).collect();
+        let rows: Result<_, ConstraintError> = Constraints::new(comm, decomposition, &supports, pairs);
+        let rows = agree(comm, "supports", rows).map_err(StudyError::Supports)?;
+        refuse_held(comm, contacts, pairs, &rows)?;
+        Ok::<_, StudyError>(rows)
+    };
+    let right_hand_sides = |rows: &Constraints| rows.rows.iter().map(|row| row.rhs).collect::<Vec<f64>>();
+    let steps = scene.steps();
+    let constraints = rows(&|name| steps[0].of_support(name))?;
+    let first = right_hand_sides(&constraints);
+    if scene.step.is_empty() || supports.iter().all(|s| s.displacement == [0.0; 3]) {
+        let (begin, ends) = (first.clone(), vec![first; steps.len()]);
+        return Ok((constraints, RightHandSides { begin, ends }));
+    }
+    let begin = right_hand_sides(&rows(&|_| 0.0)?);
+    let mut ends = vec![first];
+    for step in &steps[1..] {
+        ends.push(right_hand_sides(&rows(&|name| step.of_support(name))?));
+    }
+    Ok((constraints, RightHandSides { begin, ends }))
+}
+
+/// What is prescribed at the beginning, and the stages from there; `zeros` are those of a torn vector.
+pub(super) fn stages(scene: &Scene, discrete: &Discrete, zeros: &dyn Fn() -> Torn) -> (Conditions, Vec<Stage>) {
+    let RightHandSides { begin, ends } = &discrete.right_hand_sides;
+    let loads = |factor: &dyn Fn(&str) -> f64| {
+        let scaled = |(t, name): (&Traction, &String)| Traction { value: t.value.map(|v| factor(name) * v), ..*t };
+        let tractions: Vec<Traction> = discrete.tractions.iter().zip(scene.load.keys()).map(scaled).collect();
+        let mut loads = zeros();
+        for (subdomain, f) in discrete.decomposition.subdomains.iter().zip(&mut loads) {
+            loads::add_tractions(subdomain, &tractions, f);
+        }
+        loads
+    };
+    let stages = scene.steps().iter().zip(ends).map(|(step, rhs)| Stage {
+        end: Conditions { loads: loads(&|name| step.of_load(name)), rhs: rhs.clone() },
+        increments: step.increments,
+        halvings: step.halvings,
+    });
+    (Conditions { loads: zeros(), rhs: begin.clone() }, stages.collect())
+}
