@@ -5,7 +5,7 @@ import pathlib
 import statistics
 import sys
 
-from . import plot
+from . import kernels, plot
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "bench-results"
@@ -417,6 +417,7 @@ def contents(variants, study, ranks):
     return {
         RESULTS / "tables.md": "\n".join(text),
         RESULTS / "scalability.svg": chart,
+        RESULTS / "kernels.md": kernels.write(RESULTS / "kernels.jsonl"),
         ROOT / "README.md": f"{before}{BEGIN}\n{short}{END}{after}",
     }
 

@@ -1,0 +1,72 @@
+"""What the kernels cost, from the lines that `cargo bench --bench kernels` printed into bench-results/kernels.jsonl."""
+
+import json
+import pathlib
+
+HEAD = """\
+# Kernels, measured
+
+Written by `scripts/tables write` from [kernels.jsonl](kernels.jsonl), which `cargo bench --bench kernels` printed on one core
+of a machine with 2 (AMD EPYC, Zen 3): the best of several runs each. Cubes of n x n x n cells, elastic, three unknowns a node.
+
+- *whole factor*: of `K + rho Q`, ordered by nested dissection; *interior*: the second factor that the Dirichlet
+  preconditioner needs; *interior first*: the one factor that would replace both, with the dense Schur complement of the
+  boundary at its end.
+- *solve*: `K^+` for one vector; *Schur*: one application of `S`. *of twins*: the same where {count} congruent subdomains share
+  their factors, per subdomain.
+"""
+
+READING = """
+Two factors always win: one factor that eliminates the interior first is {length:.1f} to {length_most:.1f} times as long and takes
+{time:.1f} to {time_most:.1f} times as long as both together, so the program does not offer it. Twins are worth a factor of
+{twins:.1f} to {twins_most:.1f} in a solve.
+"""
+
+
+def ms(seconds):
+    return f"{1e3 * seconds:.3g}"
+
+
+def table(head, rows):
+    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def write(file: pathlib.Path) -> str:
+    """The page for the lines of a file."""
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    machine = next(line for line in lines if line["kind"] == "machine")
+    cubes = [line for line in lines if line["kind"] == "subdomain"]
+    coarse = [line for line in lines if line["kind"] == "coarse"]
+    peak = {"single": machine["gemm_single_gflops"], "double": machine["gemm_double_gflops"]}
+    width = {"single": 4, "double": 8}
+    rows = []
+    for cube in cubes:
+        factor, precision = cube["factor"], cube["precision"]
+        rate = factor["flops"] / factor["seconds"] / 1e9
+        read = 2 * width[precision] * factor["length"] / cube["solve"] / 1e9
+        rows.append([
+            f"{cube['cells']}, {precision}", str(cube["dofs"]), ms(cube["assembly"]), ms(factor["seconds"]),
+            f"{rate:.0f} ({100 * rate / peak[precision]:.0f} %)", ms(cube["interior_factor"]),
+            ms(cube["interior_first"]["seconds"]), ms(cube["solve"]), f"{read:.0f}", ms(cube["solve_twins"]),
+            ms(cube["schur"]), ms(cube["schur_twins"]),
+        ])
+    head = ["n, precision", "unknowns", "assembly ms", "whole factor ms", "GF/s (of matrix product)", "interior ms",
+            "interior first ms", "solve ms", "GB/s", "of twins ms", "Schur ms", "of twins ms"]
+    lengths = [cube["interior_first"]["length"] / cube["factor"]["length"] for cube in cubes]
+    times = [cube["interior_first"]["seconds"] / (cube["factor"]["seconds"] + cube["interior_factor"]) for cube in cubes]
+    twins = [cube["solve"] / cube["solve_twins"] for cube in cubes]
+    text = [HEAD.format(count=8), "Limits of one core: product of two matrices of 512 x 512 "
+            f"{peak['single']:.0f} GF/s in single and {peak['double']:.0f} GF/s in double precision; reading memory in order "
+            f"{machine['read_gb_per_s']:.0f} GB/s (one stream, not prefetched by hand).\n"]
+    text += [table(head, rows)]
+    text += [READING.format(length=min(lengths), length_most=max(lengths), time=min(times), time_most=max(times),
+                            twins=min(twins), twins_most=max(twins))]
+    text += ["## The coarse problem\n", "`G G'` of tiny subdomains (one cell each), sparse Cholesky factor on one core, in seconds.\n"]
+    text += [table(
+        ["subdomains", "numbers in the factor", "set-up", "again for another set of rows", "one solve", "one projection"],
+        [[str(line["subdomains"]), f"{line['length'] / 1e6:.1f} million", *(f"{line[key]:.3g}" for key in
+          ("setup", "restricted", "solve", "projection"))] for line in coarse],
+    )]
+    text += ["Every rank holds the whole factor, and makes it anew for every set of contacts: the last lines show where that ends.\n"]
+    return "\n".join(text)
