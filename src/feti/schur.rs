@@ -127,6 +127,8 @@ struct Values {
 pub struct Schur {
     splits: Vec<Rc<Split>>,
     values: Stock<Values>,
+    /// Of new interior factors, which may fail and be made in double precision; `None` without such factors.
+    precision: Option<Precision>,
     workspace: Workspace,
     block: Vec<f64>,
 }
@@ -145,7 +147,7 @@ impl Schur {
         }
         let workspace = Workspace::new(splits.iter().filter_map(|s| s.interior.as_ref()).map(|i| &i.cholesky));
         let values = Stock::new(splits.iter().map(|split| split.values(precision)));
-        Self { splits, values, workspace, block: Vec::new() }
+        Self { splits, values, precision, workspace, block: Vec::new() }
     }
 
     /// Local unknowns on the boundary of an own subdomain, ascending.
@@ -160,7 +162,7 @@ impl Schur {
     /// If the interior block is not positive definite; `subdomain` is named in the message.
     pub fn update(&mut self, own: usize, subdomain: usize, stiffness: &[f64], common: bool) -> Result<(), NotDefinite> {
         let split = &*self.splits[own];
-        let values = self.values.renew(own, common, || split.values(Some(Precision::Single)));
+        let values = self.values.renew(own, common, || split.values(self.precision));
         let refill = |to: &mut Vec<f64>, from: &Entries| {
             to.clear();
             to.extend(from.values(stiffness));
@@ -168,6 +170,9 @@ impl Schur {
         refill(&mut values.boundary_block, &split.boundary_block);
         refill(&mut values.coupling, &split.coupling);
         let (Some(interior), Some(factor)) = (&split.interior, &mut values.interior) else { return Ok(()) };
+        if let Some(precision) = self.precision.filter(|&precision| factor.precision() != precision) {
+            *factor = Factor::new(&interior.cholesky, precision);
+        }
         refill(&mut self.block, &interior.block);
         let mut outcome = self.workspace.factorise(&interior.cholesky, interior.lower(), &self.block, factor);
         if outcome.is_err() && factor.precision() == Precision::Single {
@@ -320,6 +325,31 @@ mod tests {
     use crate::feti::factor::analyse;
     use crate::feti::preconditioner::boundaries;
     use crate::fixture::{assert_close, built_in, column, elastic, on_ranks};
+
+    #[test]
+    fn who_leaves_its_twins_keeps_the_precision() {
+        on_ranks(&built_in("patch", &[]), 1, |setup| {
+            let symbolic = analyse(setup.subdomains());
+            let values = elastic(&setup.subdomains()[0], setup.material(0), &symbolic[0].pattern);
+            let forces = |shared: bool| {
+                let mut schur =
+                    Schur::new(&symbolic, boundaries(&setup.gather, symbolic.len()), Some(Precision::Double));
+                for own in 0..symbolic.len() {
+                    schur.update(own, own, &values, false).expect("definite");
+                }
+                let twin = (1..symbolic.len()).find(|&k| schur.alike(0, k)).expect("two boxes are alike");
+                if shared {
+                    schur.share(twin, 0);
+                    schur.update(twin, twin, &values, false).expect("definite");
+                }
+                let t: Vec<Vec<f64>> = (0..symbolic.len()).map(|own| vec![1.0; schur.boundary(own).len()]).collect();
+                let mut forces = t.clone();
+                schur.apply(&t, &mut forces);
+                forces.swap_remove(twin)
+            };
+            assert_eq!(forces(true), forces(false));
+        });
+    }
 
     /// That the forces are those of the dense formula is shown with the preconditioner.
     #[test]

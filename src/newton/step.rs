@@ -187,15 +187,16 @@ impl<'a> StepSolver<'a> {
     fn adopt(&mut self, own: usize, id: usize, timer: &Timer) -> Option<Result<(), NotDefinite>> {
         let class = self.twins[own]?;
         let elastic = |k: &usize| self.twins[*k] == Some(class) && self.yielding[*k] == Some(0);
-        let twins: Vec<usize> = (0..self.twins.len()).filter(elastic).collect();
-        let twin = *twins.first()?;
+        let mut twins = (0..self.twins.len()).filter(elastic);
+        let twin = twins.clone().next()?;
+        let alike = self.preconditioner.as_ref().and_then(|p| twins.find(|&k| p.schur.alike(own, k)));
         self.operator.factors.share(own, twin);
         self.tangents[own] = Rc::clone(&self.tangents[twin]);
         self.yielding[own] = Some(0);
         self.drift[own] = 0.0;
         let Some(Preconditioner { schur, .. }) = &mut self.preconditioner else { return Some(Ok(())) };
-        if let Some(twin) = twins.into_iter().find(|&k| schur.alike(own, k)) {
-            schur.share(own, twin);
+        if let Some(alike) = alike {
+            schur.share(own, alike);
             return Some(Ok(()));
         }
         Some(timer.time("factorisation of the interior", || schur.update(own, id, &self.tangents[own], true)))
@@ -233,21 +234,22 @@ impl<'a> StepSolver<'a> {
             timer.time("assembly", || stiffness::assemble(subdomain, material, history, &u[own], pattern, assembled));
             let known = self.yielding[own].is_some();
             let change = if known { pattern.difference(&self.tangents[own], assembled) } else { f64::INFINITY };
-            if change <= left {
+            // Where twins are elastic on other ranks only, it gets what it would get from one of them here.
+            let common = elastic && self.twins[own].is_some();
+            if change <= left && !common {
                 factorised.push(0.0);
                 continue;
             }
             factorised.push(1.0);
             self.drift[own] += change;
             self.yielding[own] = Some(state.yielding[own]);
-            let values = Rc::make_mut(&mut self.tangents[own]);
-            values.clone_from(assembled);
-            let common = elastic && self.twins[own].is_some();
+            self.tangents[own] = Rc::new(assembled.clone());
+            let values = &self.tangents[own];
             let factors = &mut self.operator.factors;
             let outcome = timer.time("factorisation", || factors.factorise(own, subdomain, values, common));
             let drift = &mut self.drift[own];
             let outcome = outcome.and_then(|()| match &mut self.preconditioner {
-                Some(Preconditioner { schur, .. }) if drift.is_nan() || *drift > DRIFT => {
+                Some(Preconditioner { schur, .. }) if common || drift.is_nan() || *drift > DRIFT => {
                     *drift = 0.0;
                     let update = || schur.update(own, subdomain.id, values, common);
                     timer.time("factorisation of the interior", update)
