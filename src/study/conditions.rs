@@ -1,10 +1,11 @@
 //! What a scene prescribes at the end of each step of its load history: right-hand sides and nodal loads.
 
-use super::{Discrete, StudyError, refuse_held};
+use super::StudyError;
+use super::discrete::Discrete;
 use crate::assembly::loads::{self, Traction};
-use crate::comm::Comm;
+use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{ConstraintError, Constraints, Support};
-use crate::contact::ContactPair;
+use crate::contact::{ContactError, ContactPair};
 use crate::decomposition::Decomposition;
 use crate::feti::Torn;
 use crate::newton::loading::{Conditions, Stage};
@@ -60,6 +61,30 @@ pub(super) fn constraints(
         ends.push(right_hand_sides(&rows(&|name| step.of_support(name))?));
     }
     Ok((constraints, RightHandSides { begin, ends }))
+}
+
+/// Overlap, in diameters of a slave node's share of the surface, that may remain where supports hold both sides.
+const HELD_OVERLAP: f64 = 1e-6;
+
+/// Refuses contacts that supports violate. Collective.
+fn refuse_held(
+    comm: &dyn Comm,
+    names: &[String],
+    pairs: &[ContactPair],
+    constraints: &Constraints,
+) -> Result<(), ContactError> {
+    let mine: Vec<u64> = constraints.idle.iter().flat_map(|&(pair, left)| [pair as u64, left.to_bits()]).collect();
+    let all = all_gather_u64(comm, &mine);
+    let mut depths: Vec<(usize, f64)> =
+        all.chunks_exact(2).map(|idle| (idle[0] as usize, -f64::from_bits(idle[1]))).collect();
+    depths.sort_by_key(|(pair, _)| *pair);
+    depths.dedup_by_key(|(pair, _)| *pair);
+    depths.retain(|&(pair, depth)| depth > HELD_OVERLAP * pairs[pair].area.sqrt());
+    let Some(&(first, _)) = depths.first() else { return Ok(()) };
+    let contact = pairs[first].contact;
+    let of_contact = || depths.iter().filter(|(pair, _)| pairs[*pair].contact == contact);
+    let depth = of_contact().fold(0.0_f64, |deepest, (_, depth)| deepest.max(*depth));
+    Err(ContactError::Held { name: names[contact].clone(), nodes: of_contact().count(), depth })
 }
 
 /// What is prescribed at the beginning, and the stages from there; `zeros` are those of a torn vector.

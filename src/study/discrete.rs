@@ -1,0 +1,157 @@
+//! The discrete problem of a scene: meshes, subdomains, contact pairs, rows.
+
+use super::StudyError;
+use super::conditions::{self, RightHandSides};
+use crate::assembly::loads::Traction;
+use crate::bodies::Meshes;
+use crate::comm::Comm;
+use crate::constraint::{Constraints, Support, dirichlet};
+use crate::contact::surface::GatheredSurface;
+use crate::contact::{ContactError, ContactPair, matching, mortar, rigid};
+use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
+use crate::material::Material;
+use crate::mesh::Face;
+use crate::monitor::timing::peak_rss_mb;
+use crate::scene::{self, Scene, SurfaceName};
+
+/// One rank's part of the discrete problem.
+pub struct Discrete {
+    /// Bodies, in the order of their names.
+    pub bodies: Vec<BodyMesh>,
+    /// Their materials.
+    pub materials: Vec<Material>,
+    /// Surfaces that the scene names.
+    pub surfaces: Vec<Surface>,
+    /// Own subdomains and interface.
+    pub decomposition: Decomposition,
+    /// Names of the contacts.
+    pub contacts: Vec<String>,
+    /// All contact pairs of the scene.
+    pub pairs: Vec<ContactPair>,
+    /// Supports, in the order of their names.
+    pub supports: Vec<Support>,
+    /// Tractions.
+    pub tractions: Vec<Traction>,
+    /// Own rows of B.
+    pub constraints: Constraints,
+    /// What the user should know of the meshes.
+    pub warnings: Vec<String>,
+    /// Indices of the surfaces in contact.
+    pub touching: Vec<usize>,
+    /// Right-hand sides of the rows over the load history.
+    pub right_hand_sides: RightHandSides,
+    /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
+    pub reading_mb: Option<f64>,
+}
+
+/// Discretises a scene. Collective.
+///
+/// # Errors
+/// If contacts cannot be paired or supports contradict each other.
+pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError> {
+    discretise_by_cost(scene, None, comm)
+}
+
+/// As [`discretise`], but spreads the subdomains over the ranks by their costs.
+///
+/// # Errors
+/// As there.
+pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm) -> Result<Discrete, StudyError> {
+    let Meshes { bodies, tets, warnings } = Meshes::new(scene, comm)?;
+    let materials = scene.body.values().map(|b| material(&scene.material[&b.material])).collect();
+    let surface = |name: &SurfaceName| {
+        let body = scene.body.keys().position(|known| *known == name.body).expect("a checked scene names its bodies");
+        let patch = match (bodies[body].brick(), name.face()) {
+            (Some(_), Some(face)) => Patch::Face(Face::ALL[face as usize]),
+            _ => Patch::Named(name.surface.clone()),
+        };
+        Surface { body, patch }
+    };
+    let mut surfaces: Vec<Surface> = scene.surfaces().map(surface).collect();
+    surfaces.sort_unstable();
+    surfaces.dedup();
+    let index = |name: &SurfaceName| surfaces.binary_search(&surface(name)).expect("every named surface is listed");
+    let touching: Vec<usize> = scene.contact.values().flat_map(scene::Contact::surfaces).map(index).collect();
+
+    let torn = Bodies { bodies: &bodies, meshes: &tets, surfaces: &surfaces, contact: &touching };
+    let decomposition = decomposition::tear(&torn, cut(&scene.decomposition, &bodies), costs, comm);
+    drop(tets);
+    let reading_mb = reading_mb(&bodies, comm);
+
+    let supports: Vec<Support> = scene
+        .support
+        .iter()
+        .map(|(name, s)| Support {
+            name: name.clone(),
+            surface: index(&s.surface),
+            fixed: scene::Axis::ALL.map(|a| s.fix.contains(&a)),
+            displacement: s.displacement.unwrap_or_default(),
+        })
+        .collect();
+    let mut pairs = Vec::new();
+    for (number, (name, contact)) in scene.contact.iter().enumerate() {
+        let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
+        let slave = gather(contact.slave());
+        pairs.extend(match contact {
+            scene::Contact::Surfaces { master, .. } => {
+                let master = gather(master);
+                match matching::pair(number, &slave, &master) {
+                    Some(pairs) if pairs.is_empty() => return Err(ContactError::Apart { name: name.clone() }.into()),
+                    Some(pairs) => pairs,
+                    None => {
+                        let held = dirichlet::held(comm, &decomposition.interface, &supports, &slave.nodes);
+                        mortar::pair(number, name, &slave, &master, &held)?
+                    }
+                }
+            }
+            scene::Contact::Rigid { rigid: obstacle, .. } => rigid::pair(number, name, &slave, obstacle)?,
+        });
+    }
+    let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
+    let contacts: Vec<String> = scene.contact.keys().cloned().collect();
+    let given =
+        conditions::Given { decomposition: &decomposition, supports: &supports, contacts: &contacts, pairs: &pairs };
+    let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given)?;
+    Ok(Discrete {
+        bodies,
+        materials,
+        surfaces,
+        decomposition,
+        contacts,
+        pairs,
+        supports,
+        tractions,
+        constraints,
+        warnings,
+        touching,
+        reading_mb,
+        right_hand_sides,
+    })
+}
+
+/// Rank 0's largest resident memory so far if it has read a mesh. Collective.
+fn reading_mb(bodies: &[BodyMesh], comm: &dyn Comm) -> Option<f64> {
+    let mut megabytes = [peak_rss_mb().unwrap_or(f64::NAN)];
+    comm.broadcast(&mut megabytes);
+    let has_read = bodies.iter().any(|body| body.brick().is_none());
+    Some(megabytes[0]).filter(|megabytes| has_read && megabytes.is_finite())
+}
+
+/// How the scene wants its bodies cut.
+pub(super) fn cut(wanted: &scene::Decomposition, bodies: &[BodyMesh]) -> Cut {
+    let divides =
+        |body: &BodyMesh| body.brick().is_some_and(|b| (0..3).all(|a| b.cells[a] % scene::PAPER_CELLS[a] == 0));
+    match *wanted {
+        scene::Decomposition::Bricks { cells } => Cut::Bricks(cells),
+        scene::Decomposition::Auto if bodies.iter().all(divides) => Cut::Bricks(scene::PAPER_CELLS),
+        scene::Decomposition::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
+        scene::Decomposition::Metis { subdomains: None } | scene::Decomposition::Auto => {
+            Cut::Metis(cost::subdomains(bodies.iter().map(|b| b.counts().elements).sum(), bodies.len()))
+        }
+    }
+}
+
+fn material(m: &scene::Material) -> Material {
+    let scene::Material { young, poisson, yield_stress, hardening, kinematic_hardening } = *m;
+    Material { young, poisson, yield_stress, hardening, kinematic_hardening }
+}

@@ -1,0 +1,189 @@
+//! What is told of a solution: rows of the log, contact states, the summary.
+
+use super::discrete::Discrete;
+use super::sizes::sizes;
+use crate::comm::Comm;
+use crate::constraint::Kind;
+use crate::newton::loading::{At, Followed};
+use crate::newton::{self, Solution, StepRecord, TornProblem};
+use crate::results::fields::{self, ContactState};
+use crate::results::summary::{self, Counters, NewtonRow, Residuals, State, StepRow, Summary};
+use crate::scene::{self, Scene};
+
+/// Where in the history an attempt leads, in words; scenes without `[[step]]` have no history to speak of.
+pub(super) fn place(scene: &Scene, at: At) -> Option<String> {
+    let step = scene.step.get(at.stage)?;
+    let mut text = format!("load step {}", at.stage + 1);
+    if !step.name.is_empty() {
+        text += &format!(" ({})", step.name);
+    }
+    if step.increments > 1 {
+        text += &format!(", increment {} of {}", at.increment, step.increments);
+    }
+    if at.fraction != at.increment as f64 / step.increments as f64 {
+        text += &format!(", up to {:.4} of the step", at.fraction);
+    }
+    Some(text)
+}
+
+/// An increment in numbers.
+pub(super) fn step_row(
+    scene: &Scene,
+    discrete: &Discrete,
+    problem: &TornProblem,
+    at: At,
+    solution: &Solution,
+    contact: &[ContactState],
+) -> StepRow {
+    StepRow {
+        step: at.stage as u64 + 1,
+        name: scene.steps()[at.stage].name.clone(),
+        increment: at.increment as u64,
+        time: at.time(),
+        halvings: at.halvings as u64,
+        converged: solution.outcome == newton::Outcome::Converged,
+        state: state(discrete, problem, solution, contact),
+    }
+}
+
+pub(super) fn newton_row(increment: usize, record: &StepRecord) -> NewtonRow {
+    NewtonRow {
+        increment: increment as u64,
+        step: record.number as u64,
+        criterion: record.criterion,
+        residual: record.residual,
+        damping: record.damping,
+        plastic_elements: record.plastic_elements as u64,
+        active_contacts: record.active_contacts as u64,
+        energy: record.energy,
+        qp_iterations: (record.statistics.outer + record.statistics.sets) as u64,
+        hessian_multiplications: record.applications as u64,
+        factorisations: record.factorisations as u64,
+        seconds: record.seconds,
+    }
+}
+
+/// The Newton steps as columns of a table; with more than one increment the first says which.
+pub(super) fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
+    let column = |name: &str, value: fn(&NewtonRow) -> f64| (name.to_owned(), rows.iter().map(value).collect());
+    let several = rows.iter().any(|row| row.increment > 1);
+    let increment = several.then(|| column("increment", |r| r.increment as f64));
+    let columns = [
+        column("criterion", |r| r.criterion),
+        column("residual", |r| r.residual),
+        column("damping", |r| r.damping),
+        column("energy", |r| r.energy),
+        column("plastic_elements", |r| r.plastic_elements as f64),
+        column("active_contacts", |r| r.active_contacts as f64),
+        column("hessian_multiplications", |r| r.hessian_multiplications as f64),
+        column("factorisations", |r| r.factorisations as f64),
+    ];
+    increment.into_iter().chain(columns).collect()
+}
+
+/// Contact of every pair whose row is on this rank.
+pub(super) fn contact_states(problem: &TornProblem, solution: &Solution) -> Vec<ContactState> {
+    let slack = problem.slack(&solution.u);
+    let rows = problem.constraints.rows.iter().zip(&slack).zip(&solution.lambda);
+    rows.filter_map(|((row, slack), lambda)| {
+        let Kind::Contact { pair } = row.kind else { return None };
+        Some(ContactState { pair, force: row.scale * lambda, gap: slack / row.scale })
+    })
+    .collect()
+}
+
+/// The numbers of a run; what belongs to the whole run (times, scene name, ranks) is filled in by the caller.
+pub(super) fn summarise(
+    scene: &Scene,
+    discrete: &Discrete,
+    followed: &Followed,
+    rows: Vec<StepRow>,
+    comm: &dyn Comm,
+) -> Summary {
+    let Followed { solution, steps, failure } = followed;
+    let sizes = sizes(discrete, comm);
+    let state = rows.last().map(|row| row.state.clone()).unwrap_or_default();
+    let total = |count: fn(&StepRecord) -> usize| Some(steps.iter().map(|(_, s)| count(s)).sum::<usize>() as u64);
+    let message = |(at, outcome): &(At, newton::Outcome)| {
+        let message = outcome.message()?;
+        Some(place(scene, *at).map_or(message.clone(), |place| format!("{place}: {message}")))
+    };
+    Summary {
+        title: scene.title.clone(),
+        converged: Some(failure.is_none()),
+        plastic_fraction: Some(solution.plastic_elements as f64 / sizes.elements as f64),
+        newton_iterations: Some(steps.len() as u64),
+        qp: qp_name(scene, discrete.constraints.has_inequalities).to_owned(),
+        counters: Counters {
+            smalse_iterations: total(|s| s.statistics.outer),
+            active_set_iterations: total(|s| s.statistics.sets),
+            dual_iterations: total(|s| s.statistics.cg + s.statistics.expansions + s.statistics.proportionings),
+            hessian_multiplications: total(|s| s.applications),
+            preconditioner_applications: total(|s| s.statistics.preconditioner),
+            factorisations: total(|s| s.factorisations),
+        },
+        error: failure.as_ref().and_then(message),
+        newton: steps.iter().map(|(increment, record)| newton_row(*increment, record)).collect(),
+        steps: rows,
+        state,
+        sizes,
+        ..summary::Summary::default()
+    }
+}
+
+/// What a solution is like. Collective.
+fn state(discrete: &Discrete, problem: &TornProblem, solution: &Solution, contact: &[ContactState]) -> State {
+    let reactions = problem.reactions(&solution.u, &solution.lambda, discrete.supports.len());
+    let contact_forces = contact_forces(problem, discrete, contact);
+    let names = discrete.supports.iter().map(|s| s.name.clone());
+    let maximum = |x: f64| problem.space.maximum(x);
+    State {
+        plastic_elements: Some(solution.plastic_elements as u64),
+        active_contacts: Some(problem.active_contacts(&solution.lambda) as u64),
+        contact_force: Some(std::array::from_fn(|axis| {
+            contact_forces.iter().fold(0.0, |sum, force| sum + force[axis])
+        })),
+        contact_forces: discrete.contacts.iter().cloned().zip(contact_forces).collect(),
+        reactions: names.zip(reactions).collect(),
+        external_work: Some(solution.external_work),
+        internal_energy: Some(solution.internal_energy),
+        energy: Some(solution.energy),
+        max_displacement: Some(maximum(newton::residuals::largest_displacement(&solution.u))),
+        max_von_mises: Some(maximum(fields::largest_von_mises(problem, &solution.u))),
+        residuals: Residuals {
+            equilibrium: Some(solution.residuals.equilibrium),
+            gluing: Some(solution.residuals.gluing),
+            gap: Some(solution.residuals.gap),
+            complementarity: Some(solution.residuals.complementarity),
+        },
+    }
+}
+
+/// The solver of the quadratic programs, by its name in scene files.
+fn qp_name(scene: &Scene, has_inequalities: bool) -> &'static str {
+    match scene.solver.qp {
+        _ if !has_inequalities => "pcpg",
+        scene::Qp::SmalseM => "smalse-m",
+        scene::Qp::ActiveSet => "active-set",
+    }
+}
+
+/// Force that the other side exerts on the slave surface of each contact.
+fn contact_forces(problem: &TornProblem, discrete: &Discrete, contact: &[ContactState]) -> Vec<[f64; 3]> {
+    let Discrete { contacts, pairs, .. } = discrete;
+    let mut of_pair = vec![None; pairs.len()];
+    contact.iter().for_each(|state| of_pair[state.pair] = Some(state.force));
+    let mut partial = Vec::new();
+    for rows in problem.space.owned() {
+        let mut sums = vec![[0.0; 3]; contacts.len()];
+        for &row in rows {
+            if let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind {
+                let force = pairs[pair].force(of_pair[pair].unwrap_or_default());
+                sums[pairs[pair].contact].iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
+            }
+        }
+        partial.extend_from_slice(sums.as_flattened());
+    }
+    let sum = problem.space.sum(&partial, 3 * contacts.len());
+    sum.as_chunks::<3>().0.to_vec()
+}
