@@ -146,3 +146,46 @@ fn a_body_that_is_pulled_off_its_only_hold_ends_as_an_outcome() {
     assert_eq!(summary["converged"], false);
     assert!(summary["error"].is_string(), "{}", summary["error"]);
 }
+
+/// Three walls around the top of a block, so slanted that closing a contact opens another: the active sets come back.
+const CYCLE: &str = r#"
+[material.block]
+young = 1.0
+poisson = 0.0
+[body.block]
+material = "block"
+element = "tet4"
+brick = { origin = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0], cells = [1, 1, 2] }
+[support.bottom]
+surface = "block.zmin"
+fix = ["x", "y", "z"]
+[load.top]
+surface = "block.zmax"
+traction = [0.5, -0.9, -0.9]
+[contact.first]
+slave = "block.zmax"
+rigid = { plane = { point = [1.0, 0.1, 0.9], normal = [-0.2, 0.5, -0.8] } }
+[contact.second]
+slave = "block.zmax"
+rigid = { plane = { point = [1.0, 1.0, 1.0], normal = [-0.3, 0.7, -0.7] } }
+[contact.third]
+slave = "block.zmax"
+rigid = { plane = { point = [-0.1, 1.1, 1.1], normal = [0.7, -0.5, -0.4] } }
+[decomposition]
+method = "metis"
+subdomains = 2
+[solver]
+residual_tolerance = 1e-9
+"#;
+
+#[test]
+fn where_active_sets_come_back_the_safeguard_ends_with_the_same_solution() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), CYCLE);
+    let [fast, safe] = ["active-set", "smalse-m"]
+        .map(|qp| assert_solved(solve(RANKS, &scene, &[&format!("solver.qp={qp}"), "solver.newton_tolerance=1e-8"])));
+    assert!(number(&fast, "active_set_iterations") > 1.0);
+    assert!(number(&fast, "smalse_iterations") > 0.0, "no set has come back");
+    assert_close("energy", number(&fast, "energy"), number(&safe, "energy"), 1e-8);
+    assert_near("contact force", vector(&fast["contact_force"]), vector(&safe["contact_force"]), 1e-8);
+}

@@ -5,6 +5,7 @@
 //! for the time of the pairing only; what is kept of it are the pairs.
 
 pub mod clip;
+pub mod corner;
 pub mod dual;
 pub mod matching;
 pub mod mortar;
@@ -76,6 +77,17 @@ pub enum ContactError {
         name: String,
         /// All slave nodes.
         slaves: usize,
+    },
+    /// Obstacles meet at a node in more directions than it has components.
+    #[error(
+        "contact.{names}: {nodes} nodes meet these obstacles in more directions than are independent there, so the contact \
+         forces would not be unique; give each obstacle the part of the surface that it can touch"
+    )]
+    Crowded {
+        /// Names of the contacts at the first such node.
+        names: String,
+        /// How many such nodes there are.
+        nodes: usize,
     },
     /// Supports hold a slave node where it overlaps with the other side.
     #[error(

@@ -7,7 +7,7 @@ use crate::bodies::Meshes;
 use crate::comm::Comm;
 use crate::constraint::{Constraints, Support, dirichlet};
 use crate::contact::surface::GatheredSurface;
-use crate::contact::{ContactError, ContactPair, matching, mortar, rigid};
+use crate::contact::{ContactError, ContactPair, corner, matching, mortar, rigid};
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
 use crate::material::Material;
 use crate::mesh::Face;
@@ -88,6 +88,7 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
             displacement: s.displacement.unwrap_or_default(),
         })
         .collect();
+    let held = |nodes: &[u64]| dirichlet::held(comm, &decomposition.interface, &supports, nodes);
     let mut pairs = Vec::new();
     for (number, (name, contact)) in scene.contact.iter().enumerate() {
         let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
@@ -98,10 +99,7 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
                 match matching::pair(number, &slave, &master) {
                     Some(pairs) if pairs.is_empty() => return Err(ContactError::Apart { name: name.clone() }.into()),
                     Some(pairs) => pairs,
-                    None => {
-                        let held = dirichlet::held(comm, &decomposition.interface, &supports, &slave.nodes);
-                        mortar::pair(number, name, &slave, &master, &held)?
-                    }
+                    None => mortar::pair(number, name, &slave, &master, &held(&slave.nodes))?,
                 }
             }
             scene::Contact::Rigid { rigid: obstacle, .. } => rigid::pair(number, name, &slave, obstacle)?,
@@ -109,6 +107,7 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     }
     let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
     let contacts: Vec<String> = scene.contact.keys().cloned().collect();
+    corner::check(&contacts, &pairs, held)?;
     let given =
         conditions::Given { decomposition: &decomposition, supports: &supports, contacts: &contacts, pairs: &pairs };
     let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given)?;

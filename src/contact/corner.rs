@@ -1,0 +1,116 @@
+//! Nodes that several rigid obstacles stop: their conditions must be independent.
+//!
+//! A node has three components, fewer where supports hold it, and cannot meet more obstacles than that in different
+//! directions: the forces would not be unique, and the dual problem singular on any set that holds them all. Conditions
+//! of one direction are no matter, the tightest stands for all ([`crate::constraint::contact`]).
+
+use std::collections::BTreeMap;
+
+use super::surface::dot;
+use super::{ContactError, ContactPair};
+
+/// Distance of a unit vector to the others or to their span from which a direction counts as independent.
+const INDEPENDENT: f64 = 1e-6;
+
+/// Refuses obstacles that are too many for a node. `held` tells which components of some nodes supports fix; it is asked
+/// at most once, with the same nodes on every rank.
+///
+/// # Errors
+/// With the contacts that meet at the first such node.
+pub fn check(
+    names: &[String],
+    pairs: &[ContactPair],
+    held: impl FnOnce(&[u64]) -> Vec<[bool; 3]>,
+) -> Result<(), ContactError> {
+    let mut stopped: BTreeMap<u64, Vec<&ContactPair>> = BTreeMap::new();
+    for pair in pairs.iter().filter(|pair| pair.masters.is_empty()) {
+        stopped.entry(pair.slave).or_default().push(pair);
+    }
+    stopped.retain(|_, pairs| pairs.len() > 1);
+    let nodes: Vec<u64> = stopped.keys().copied().collect();
+    if nodes.is_empty() {
+        return Ok(());
+    }
+    let mut crowded = Vec::new();
+    for (pairs, held) in stopped.values().zip(held(&nodes)) {
+        let free = |pair: &ContactPair| unit(std::array::from_fn(|a| if held[a] { 0.0 } else { pair.normal[a] }));
+        let mut directions: Vec<[f64; 3]> = Vec::new();
+        for direction in pairs.iter().filter_map(|pair| free(pair)) {
+            if directions.iter().all(|known| chord(direction, *known) > INDEPENDENT) {
+                directions.push(direction);
+            }
+        }
+        if directions.len() > rank(&directions) {
+            crowded.push(pairs);
+        }
+    }
+    let Some(first) = crowded.first() else { return Ok(()) };
+    let mut contacts: Vec<&str> = first.iter().map(|pair| names[pair.contact].as_str()).collect();
+    contacts.dedup();
+    Err(ContactError::Crowded { names: contacts.join(", "), nodes: crowded.len() })
+}
+
+/// Directions that are independent of those before them.
+fn rank(directions: &[[f64; 3]]) -> usize {
+    let mut basis: Vec<[f64; 3]> = Vec::new();
+    for direction in directions {
+        let mut rest = *direction;
+        for b in &basis {
+            let along = dot(rest, *b);
+            rest.iter_mut().zip(b).for_each(|(r, b)| *r -= along * b);
+        }
+        if dot(rest, rest).sqrt() > INDEPENDENT {
+            basis.extend(unit(rest));
+        }
+    }
+    basis.len()
+}
+
+/// Length between the tips of two unit vectors.
+fn chord(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let difference: [f64; 3] = std::array::from_fn(|axis| a[axis] - b[axis]);
+    dot(difference, difference).sqrt()
+}
+
+fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+    let length = dot(v, v).sqrt();
+    (length > f64::from(f32::MIN_POSITIVE)).then(|| v.map(|v| v / length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(normals: &[[f64; 3]], held: [bool; 3]) -> Result<(), ContactError> {
+        let names: Vec<String> = (0..normals.len()).map(|k| format!("wall-{k}")).collect();
+        let pair = |(contact, &normal): (usize, &[f64; 3])| ContactPair {
+            contact,
+            slave: 7,
+            others: Vec::new(),
+            masters: Vec::new(),
+            normal: unit(normal).expect("not zero"),
+            gap: 0.0,
+            area: 1.0,
+        };
+        let pairs: Vec<ContactPair> = normals.iter().enumerate().map(pair).collect();
+        check(&names, &pairs, |nodes| vec![held; nodes.len()])
+    }
+
+    #[test]
+    fn a_node_may_be_stopped_in_as_many_directions_as_it_is_free() {
+        let corner = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, 0.2, 1.0]];
+        let crowded = |names: &str| Err(ContactError::Crowded { names: names.into(), nodes: 1 });
+        assert_eq!(checked(&corner, [false; 3]), Ok(()));
+        let four = [&corner[..], &[[1.0, 1.0, 1.0]]].concat();
+        assert_eq!(checked(&four, [false; 3]), crowded("wall-0, wall-1, wall-2, wall-3"));
+        // A groove whose bottom is a third wall in one plane with its sides.
+        let groove = [[1.0, 0.0, -1.0], [-1.0, 0.0, -1.0], [0.0, 0.0, -1.0]];
+        assert_eq!(checked(&groove, [false; 3]), crowded("wall-0, wall-1, wall-2"));
+        assert_eq!(checked(&groove[..2], [false; 3]), Ok(()));
+        assert_eq!(checked(&corner, [true, false, false]), Ok(()), "one is held already");
+        assert_eq!(checked(&groove[..2], [true, true, false]), Ok(()), "what is left has one direction");
+        assert_eq!(checked(&corner[..2], [true, false, true]), Ok(()));
+        assert_eq!(checked(&[[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]], [true, false, true]), crowded("wall-0, wall-1"));
+        assert_eq!(checked(&[corner[0], corner[0], corner[1]], [false; 3]), Ok(()), "twice the same");
+    }
+}
