@@ -3,21 +3,23 @@
 //! Every rank runs the same command. What one rank finds out, rank 0 above all, is shared before anybody acts on it, so
 //! all ranks end with the same code and one message.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use thiserror::Error;
 
 use crate::bodies::MeshError;
+use crate::comm::metered::Metered;
 use crate::comm::{Comm, Shares, ordered_sum};
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
-use crate::monitor::timing::{PhaseTable, Timer, peak_rss_mb};
+use crate::monitor::timing::{Phase, PhaseTable, Timer, peak_rss_mb};
 use crate::results::OutputError;
 use crate::results::agree::root_texts;
 use crate::results::replace;
-use crate::results::summary::{CascadeRow, Summary};
+use crate::results::summary::{CascadeRow, CommunicationRow, Summary};
 use crate::results::vtkhdf;
 use crate::scene::{Scene, SceneError, library};
 use crate::study::{self, StudyError};
@@ -228,6 +230,7 @@ fn run_name(source: &Source) -> String {
 }
 
 fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
+    let comm = &Metered::new(comm);
     let timer = Timer::start();
     let mut monitor = Monitor::of_rank(comm.rank(), arguments.progress);
     let Solve { source, out, qp, preconditioner, cascade, .. } = arguments;
@@ -265,13 +268,15 @@ fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     let (discrete, mut solved) = solve_level(&source, source.level, &scene, coarser, comm, &timer, &mut monitor)?;
     timer.time("output", || vtkhdf::write(comm, &result, &solved.piece, &solved.records))?;
 
-    let table = PhaseTable::gather(comm, &timer);
+    let table = PhaseTable::gather(comm, &timer, comm.traffic());
     let summary = &mut solved.summary;
     describe_run(summary, &source, comm);
     summary.warnings = warnings(&scene, &discrete, comm);
     summary.mesh_reading_mb = discrete.reading_mb;
     summary.cascade = rows;
     summary.time = table.max_seconds();
+    summary.work = table.work();
+    summary.communication = communication(&table);
     summary.time_total = Some(table.total_seconds);
     summary.write(comm, &summary_file)?;
 
@@ -340,6 +345,16 @@ fn check(source: &Source, comm: &dyn Comm) -> Result<i32, Failure> {
         summary.write(comm, file)?;
     }
     Ok(0)
+}
+
+/// Messages as rows of the summary.
+fn communication(table: &PhaseTable) -> BTreeMap<String, CommunicationRow> {
+    let row = |kind: &Phase| CommunicationRow {
+        calls: kind.calls,
+        seconds: kind.max_seconds,
+        megabytes: kind.work.bytes / f64::from(1 << 20),
+    };
+    table.communication.iter().map(|kind| (kind.name.clone(), row(kind))).collect()
 }
 
 /// What the user should know before the run starts.

@@ -76,6 +76,14 @@ impl Factor {
             Self::Double(_) => Precision::Double,
         }
     }
+
+    /// Size of its numbers, in bytes. A solve reads them twice.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Single(numbers) => size_of_val(&numbers[..]),
+            Self::Double(numbers) => size_of_val(&numbers[..]),
+        }
+    }
 }
 
 /// The matrix is not positive definite: where the factorisation broke down.

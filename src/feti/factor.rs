@@ -161,6 +161,11 @@ impl Factors {
         self.factors.share(own, twin);
     }
 
+    /// Bytes of factors that one [`Factors::solve`] reads, forward and backward.
+    pub fn bytes_per_solve(&self) -> f64 {
+        self.factors.sum(|factor| 2.0 * factor.bytes() as f64)
+    }
+
     /// `x = K^+ x`, subdomain by subdomain.
     pub fn solve(&mut self, x: &mut Torn) {
         for batch in self.factors.batches() {

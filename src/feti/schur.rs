@@ -182,6 +182,21 @@ impl Schur {
         outcome.map_err(|breakdown| NotDefinite { subdomain, pivot: breakdown.place, dofs: interior.unknowns.len() })
     }
 
+    /// Additions and multiplications of factorising the interior of an own subdomain.
+    pub fn flops(&self, own: usize) -> f64 {
+        self.splits[own].interior.as_ref().map_or(0.0, |interior| interior.cholesky.flops())
+    }
+
+    /// Bytes of matrices that one [`Schur::apply`] reads: the factor twice, so the coupling, the boundary block once.
+    pub fn bytes_per_apply(&self) -> f64 {
+        let number = (size_of::<f64>() + size_of::<u32>()) as f64;
+        self.values.sum(|values| {
+            let factor = values.interior.as_ref().map_or(0, Factor::bytes);
+            let sparse = values.boundary_block.len() + 2 * values.coupling.len();
+            2.0 * factor as f64 + number * sparse as f64
+        })
+    }
+
     /// Whether two own subdomains have the same boundary, so that one may [`Schur::share`] the other's values.
     pub fn alike(&self, own: usize, other: usize) -> bool {
         Rc::ptr_eq(&self.splits[own], &self.splits[other])

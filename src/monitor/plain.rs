@@ -94,14 +94,25 @@ fn newton_line(row: &NewtonRow) -> String {
 }
 
 fn phase_lines(table: &PhaseTable) -> Vec<String> {
-    let header = format!("{:<24} {:>8} {:>10} {:>8} {:>6}", "phase", "calls", "max s", "max/min", "%");
+    let header = format!(
+        "{:<29} {:>7} {:>9} {:>7} {:>5} {:>8} {:>8}",
+        "phase", "calls", "max s", "max/min", "%", "GF/s", "GB/s"
+    );
     let row = |phase: &super::timing::Phase| {
         let ratio = phase.ratio().map_or("-".into(), |ratio| format!("{ratio:.2}"));
         let percent = 100.0 * phase.max_seconds / table.total_seconds;
-        format!("{:<24} {:>8} {:>10.3} {ratio:>8} {percent:>6.1}", phase.name, phase.calls, phase.max_seconds)
+        let rate = |work: f64| match work / phase.max_seconds / 1e9 {
+            rate if work > 0.0 => format!("{rate:.2}"),
+            _ => String::new(),
+        };
+        let (name, calls, seconds) = (&phase.name, phase.calls, phase.max_seconds);
+        let line = format!("{name:<29} {calls:>7} {seconds:>9.3} {ratio:>7} {percent:>5.1}");
+        format!("{line} {:>8} {:>8}", rate(phase.work.flops), rate(phase.work.bytes)).trim_end().to_owned()
     };
-    let total = format!("{:<24} {:>8} {:>10.3} {:>8} {:>6.1}", "total", "", table.total_seconds, "", 100.0);
-    [header].into_iter().chain(table.phases.iter().map(row)).chain([total]).collect()
+    let total = format!("{:<29} {:>7} {:>9.3} {:>7} {:>5.1}", "total", "", table.total_seconds, "", 100.0);
+    let messages = (!table.communication.is_empty()).then(|| "of it in messages, with waiting for other ranks".into());
+    let (phases, communication) = (table.phases.iter().map(row), table.communication.iter().map(row));
+    [header].into_iter().chain(phases).chain([total]).chain(messages).chain(communication).collect()
 }
 
 fn residual_lines(residuals: &Residuals) -> Vec<String> {

@@ -1,18 +1,28 @@
-//! How long the phases of a run take, and how evenly over the ranks; how much memory a rank took.
+//! How long the phases of a run take, how evenly over the ranks, and how much work they do; how much memory a rank took.
 //!
-//! Wall time. Phases do not nest, so that their sum is at most the total.
+//! Wall time. Phases do not nest, so that their sum is at most the total; communication is part of them.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use crate::comm::{Comm, all_gather_text, maximum};
+use crate::comm::metered::{KINDS, Traffic};
+use crate::comm::{Comm, Shares, all_gather_text, maximum, ordered_sum};
+use crate::results::summary::Work;
 
 /// Collects the seconds that one rank spends in named phases.
 #[derive(Clone, Debug)]
 pub struct Timer {
     started: Instant,
-    phases: RefCell<Vec<(&'static str, u64, f64)>>,
+    phases: RefCell<Vec<(&'static str, Spent)>>,
+}
+
+/// What one rank spent in a phase.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spent {
+    calls: u64,
+    seconds: f64,
+    work: Work,
 }
 
 impl Default for Timer {
@@ -37,14 +47,27 @@ impl Timer {
 
     /// Counts seconds measured elsewhere as one call of a phase.
     pub fn add(&self, phase: &'static str, seconds: f64) {
+        self.book(phase, |spent| {
+            spent.calls += 1;
+            spent.seconds += seconds;
+        });
+    }
+
+    /// Counts work done in a phase.
+    pub fn count(&self, phase: &'static str, flops: f64, bytes: f64) {
+        self.book(phase, |spent| {
+            spent.work.flops += flops;
+            spent.work.bytes += bytes;
+        });
+    }
+
+    fn book(&self, phase: &'static str, add: impl FnOnce(&mut Spent)) {
         let mut phases = self.phases.borrow_mut();
-        match phases.iter_mut().find(|(name, ..)| *name == phase) {
-            Some((_, calls, sum)) => {
-                *calls += 1;
-                *sum += seconds;
-            }
-            None => phases.push((phase, 1, seconds)),
-        }
+        let at = phases.iter().position(|(name, _)| *name == phase).unwrap_or_else(|| {
+            phases.push((phase, Spent::default()));
+            phases.len() - 1
+        });
+        add(&mut phases[at].1);
     }
 
     /// Seconds since the start.
@@ -52,11 +75,10 @@ impl Timer {
         self.started.elapsed().as_secs_f64()
     }
 
-    /// Calls and seconds of a phase; nothing if it never ran here.
-    fn spent(&self, phase: &str) -> [f64; 2] {
+    /// What was spent in a phase; nothing if it never ran here.
+    fn spent(&self, phase: &str) -> Spent {
         let phases = self.phases.borrow();
-        let found = phases.iter().find(|(name, ..)| *name == phase);
-        found.map_or([0.0; 2], |&(_, calls, seconds)| [calls as f64, seconds])
+        phases.iter().find(|(name, _)| *name == phase).map(|(_, spent)| *spent).unwrap_or_default()
     }
 }
 
@@ -65,6 +87,8 @@ impl Timer {
 pub struct PhaseTable {
     /// In order of first use: rank 0's, then what only others have.
     pub phases: Vec<Phase>,
+    /// Messages of each kind; their seconds are part of the phases'. None of a kind that was not used.
+    pub communication: Vec<Phase>,
     /// Wall time of the slowest rank since its timer was started.
     pub total_seconds: f64,
 }
@@ -80,6 +104,8 @@ pub struct Phase {
     pub max_seconds: f64,
     /// Seconds on the fastest rank.
     pub min_seconds: f64,
+    /// Of all ranks together. Of messages: bytes handed in.
+    pub work: Work,
 }
 
 impl Phase {
@@ -90,8 +116,8 @@ impl Phase {
 }
 
 impl PhaseTable {
-    /// Compares the timers of all ranks. Collective.
-    pub fn gather(comm: &dyn Comm, timer: &Timer) -> Self {
+    /// Compares the timers and messages of all ranks. Collective.
+    pub fn gather(comm: &dyn Comm, timer: &Timer, traffic: [Traffic; 3]) -> Self {
         let mine: Vec<&str> = timer.phases.borrow().iter().map(|&(name, ..)| name).collect();
         let mut names: Vec<String> = Vec::new();
         for list in all_gather_text(comm, &mine.join("\n")) {
@@ -101,24 +127,44 @@ impl PhaseTable {
                 }
             }
         }
+        let messages = traffic.map(|Traffic { calls, seconds, bytes }| {
+            let work = Work { flops: 0.0, bytes: bytes as f64 };
+            Spent { calls, seconds, work }
+        });
+        let spent: Vec<Spent> = names.iter().map(|name| timer.spent(name)).chain(messages).collect();
         // One collective for all: the smallest is the largest of the negatives.
         let mut values = vec![timer.total_seconds()];
-        for [calls, seconds] in names.iter().map(|name| timer.spent(name)) {
-            values.extend([calls, seconds, -seconds]);
-        }
+        values.extend(spent.iter().flat_map(|s| [s.calls as f64, s.seconds, -s.seconds]));
         let largest = maximum(comm, &values);
-        let phases = names.into_iter().zip(largest[1..].chunks_exact(3)).map(|(name, row)| Phase {
-            name,
-            calls: row[0] as u64,
-            max_seconds: row[1],
-            min_seconds: -row[2],
-        });
-        Self { phases: phases.collect(), total_seconds: largest[0] }
+        let work: Vec<f64> = spent.iter().flat_map(|s| [s.work.flops, s.work.bytes]).collect();
+        let work = ordered_sum(comm, &Shares(vec![1; comm.size()]), &work, work.len());
+        let count = names.len();
+        let names = names.into_iter().chain(KINDS.map(str::to_owned));
+        let rows = largest[1..].chunks_exact(3).zip(work.chunks_exact(2));
+        let mut phases: Vec<Phase> = names
+            .zip(rows)
+            .map(|(name, (row, work))| Phase {
+                name,
+                calls: row[0] as u64,
+                max_seconds: row[1],
+                min_seconds: -row[2],
+                work: Work { flops: work[0], bytes: work[1] },
+            })
+            .collect();
+        let mut communication = phases.split_off(count);
+        communication.retain(|kind| kind.calls > 0);
+        Self { phases, communication, total_seconds: largest[0] }
     }
 
     /// Seconds of each phase on the slowest rank, by name.
     pub fn max_seconds(&self) -> BTreeMap<String, f64> {
         self.phases.iter().map(|phase| (phase.name.clone(), phase.max_seconds)).collect()
+    }
+
+    /// Work of each phase where it is known, by name.
+    pub fn work(&self) -> BTreeMap<String, Work> {
+        let known = self.phases.iter().filter(|phase| phase.work != Work::default());
+        known.map(|phase| (phase.name.clone(), phase.work)).collect()
     }
 }
 
@@ -145,15 +191,21 @@ mod tests {
                 timer.add("contact", 2.0);
             }
             assert_eq!(timer.time("assembly", || 7), 7);
-            PhaseTable::gather(comm, &timer)
+            timer.count("assembly", 10.0, comm.rank() as f64);
+            let sent = Traffic { calls: 2, seconds: 0.5, bytes: 8 };
+            PhaseTable::gather(comm, &timer, [sent, Traffic::default(), Traffic::default()])
         });
         assert!(tables.iter().all(|t| *t == tables[0]));
         let names: Vec<&str> = tables[0].phases.iter().map(|p| &p.name[..]).collect();
         assert_eq!(names, ["factorisation", "assembly", "contact"]);
-        let [factorisation, _, contact] = &tables[0].phases[..] else { panic!("three phases") };
+        let [factorisation, assembly, contact] = &tables[0].phases[..] else { panic!("three phases") };
         assert_eq!((factorisation.calls, factorisation.max_seconds, factorisation.min_seconds), (2, 3.5, 1.5));
         assert_eq!((contact.calls, contact.max_seconds, contact.ratio()), (1, 2.0, None));
         assert_eq!(tables[0].max_seconds()["factorisation"], 3.5);
+        assert_eq!(assembly.work, Work { flops: 30.0, bytes: 3.0 });
+        assert_eq!(tables[0].work().into_keys().collect::<Vec<_>>(), ["assembly"]);
+        let [exchange] = &tables[0].communication[..] else { panic!("one kind of messages") };
+        assert_eq!((exchange.calls, exchange.work.bytes, exchange.ratio()), (2, 24.0, Some(1.0)));
     }
 
     #[test]

@@ -56,6 +56,7 @@ impl<'a> Dual<'_, 'a> {
 impl Operator for Dual<'_, '_> {
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.timer.time("dual operator", || self.operator.apply(x, y));
+        self.timer.count("dual operator", 0.0, self.operator.factors.bytes_per_solve());
         (self.alive)(self.operator.applications());
     }
 }
@@ -70,6 +71,7 @@ impl Quadratic for Dual<'_, '_> {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         let Some(preconditioner) = &mut self.preconditioner else { return false };
         self.timer.time("preconditioner", || preconditioner.apply(r, z));
+        self.timer.count("preconditioner", 0.0, preconditioner.schur.bytes_per_apply());
         true
     }
 }

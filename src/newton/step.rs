@@ -143,7 +143,7 @@ impl<'a> StepSolver<'a> {
         let slack = problem.slack(u);
         let mut b = vec![0.0; rows];
         let mut torn = forces.clone();
-        timer.time("dual operator", || self.operator.respond(&warm.lambda, &mut torn, &mut b));
+        self.respond(&warm.lambda, &mut torn, &mut b, timer);
         b.iter_mut().zip(&slack).for_each(|(b, s)| *b -= s);
 
         let dual = Dual {
@@ -158,7 +158,7 @@ impl<'a> StepSolver<'a> {
 
         let mut du = forces;
         let mut defect = vec![0.0; rows];
-        timer.time("dual operator", || self.operator.respond(&balanced, &mut du, &mut defect));
+        self.respond(&balanced, &mut du, &mut defect, timer);
         defect.iter_mut().zip(&slack).for_each(|(d, s)| *d = s - *d);
         if let Some(held) = self.programs.held() {
             let amplitudes = timer.time("coarse problem", || held.amplitudes(&self.projector.coarse, &defect));
@@ -167,6 +167,12 @@ impl<'a> StepSolver<'a> {
         self.mend(problem, &slack, &mut du, timer);
         let applications = self.operator.applications() - before;
         Ok(Step { du, lambda, outcome, statistics, at_floor, applications, factorisations })
+    }
+
+    /// `torn = K^+ (torn - B' x)` and `y = B torn`.
+    fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64], timer: &Timer) {
+        timer.time("dual operator", || self.operator.respond(x, torn, y));
+        timer.count("dual operator", 0.0, self.operator.factors.bytes_per_solve());
     }
 
     /// Closes what the dual solver's tolerance left open in the held and the violated rows, at the least cost in energy
@@ -199,6 +205,7 @@ impl<'a> StepSolver<'a> {
             schur.share(own, alike);
             return Some(Ok(()));
         }
+        timer.count("factorisation of the interior", schur.flops(own), 0.0);
         Some(timer.time("factorisation of the interior", || schur.update(own, id, &self.tangents[own], true)))
     }
 
@@ -247,10 +254,12 @@ impl<'a> StepSolver<'a> {
             let values = &self.tangents[own];
             let factors = &mut self.operator.factors;
             let outcome = timer.time("factorisation", || factors.factorise(own, subdomain, values, common));
+            timer.count("factorisation", factors.symbolic(own).analysis().flops(), 0.0);
             let drift = &mut self.drift[own];
             let outcome = outcome.and_then(|()| match &mut self.preconditioner {
                 Some(Preconditioner { schur, .. }) if common || drift.is_nan() || *drift > DRIFT => {
                     *drift = 0.0;
+                    timer.count("factorisation of the interior", schur.flops(own), 0.0);
                     let update = || schur.update(own, subdomain.id, values, common);
                     timer.time("factorisation of the interior", update)
                 }

@@ -46,6 +46,10 @@ pub struct Summary {
     pub time_total: Option<f64>,
     /// Seconds of each phase on the slowest rank.
     pub time: BTreeMap<String, f64>,
+    /// What phases do at least, all ranks together, where that is known.
+    pub work: BTreeMap<String, Work>,
+    /// Messages by kind; their seconds are part of the phases'.
+    pub communication: BTreeMap<String, CommunicationRow>,
     /// Sum over the ranks of their largest resident memory, in MiB.
     pub peak_rss_mb: Option<f64>,
     /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
@@ -62,6 +66,26 @@ pub struct Summary {
     pub newton: Vec<NewtonRow>,
     /// Coarser levels that were solved before for a start, coarsest first.
     pub cascade: Vec<CascadeRow>,
+}
+
+/// What a phase does at least, where that is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Work {
+    /// Additions and multiplications.
+    pub flops: f64,
+    /// Bytes of matrices read.
+    pub bytes: f64,
+}
+
+/// Messages of one kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct CommunicationRow {
+    /// On the rank with most of them.
+    pub calls: u64,
+    /// On the slowest rank, waiting for others included.
+    pub seconds: f64,
+    /// Handed in by all ranks together.
+    pub megabytes: f64,
 }
 
 /// What a solution is like. Energies are those of the last increment: what is stored elastically, and what this increment
