@@ -83,7 +83,12 @@ fn subdomain(cells: usize) {
     });
     for precision in [Precision::Single, Precision::Double] {
         let mut factors = Factors::new(symbolic.clone(), precision);
-        let mut schur = Schur::new(&symbolic, subdomains.iter().map(surface).collect(), Some(precision));
+        let mut schur = Schur::new(
+            &symbolic,
+            subdomains.iter().map(surface).collect(),
+            &vec![COUNT; subdomains.len()],
+            Some(precision),
+        );
         let (mut factor, mut interior) = (f64::INFINITY, f64::INFINITY);
         for (own, subdomain) in subdomains.iter().enumerate() {
             let whole = || factors.factorise(own, subdomain, &values, false).expect("it is definite");

@@ -104,8 +104,8 @@ pub fn closed_contacts(
 }
 
 /// Cost of a subdomain that yields, in those of one that is elastic and has congruent ones (10^3 cells, factorised in
-/// every step; `benches/kernels.rs`).
-const YIELDING: u64 = 8;
+/// most steps; `benches/kernels.rs`, and where ranks wait at level 3).
+const YIELDING: u64 = 6;
 
 /// What the boxes of a finer mesh are likely to cost, from where the coarse one yields. Collective.
 pub fn costs<'a>(

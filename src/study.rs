@@ -18,7 +18,7 @@ use crate::constraint::Kind;
 use crate::contact::ContactError;
 use crate::decomposition::Cut;
 use crate::decomposition::bricks::Boxes;
-use crate::decomposition::twins::twins;
+use crate::decomposition::twins::{alike, twins};
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
@@ -128,7 +128,8 @@ pub fn solve(
     };
     let schur = |precision| {
         let boundaries = preconditioner::boundaries(&gather, subdomains.len());
-        timer.time("symbolic analysis", || Schur::new(&symbolic, boundaries, precision))
+        let alike = alike(comm, subdomains, &boundaries);
+        timer.time("symbolic analysis", || Schur::new(&symbolic, boundaries, &alike, precision))
     };
     let preconditioner = match scene.solver.preconditioner {
         scene::Preconditioner::None => None,

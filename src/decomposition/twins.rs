@@ -30,6 +30,20 @@ pub fn twins(comm: &dyn Comm, subdomains: &[Subdomain]) -> Vec<Option<usize>> {
         .collect()
 }
 
+/// For each own subdomain, how many congruent ones there are whose rows touch the same local unknowns (`boundaries`),
+/// itself included, on all ranks together. Collective.
+pub fn alike(comm: &dyn Comm, subdomains: &[Subdomain], boundaries: &[Vec<u32>]) -> Vec<usize> {
+    let kind = |(subdomain, boundary)| {
+        let mut hasher = DefaultHasher::new();
+        (hash(subdomain), boundary).hash(&mut hasher);
+        hasher.finish()
+    };
+    let mine: Vec<u64> = subdomains.iter().zip(boundaries).map(kind).collect();
+    let mut count: HashMap<u64, usize> = HashMap::new();
+    all_gather_u64(comm, &mine).into_iter().for_each(|kind| *count.entry(kind).or_default() += 1);
+    mine.iter().map(|kind| count[kind]).collect()
+}
+
 fn congruent(a: &Subdomain, b: &Subdomain) -> bool {
     a.body == b.body && a.shape == b.shape && a.elements == b.elements
 }
@@ -45,6 +59,7 @@ fn hash(subdomain: &Subdomain) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::feti::preconditioner::boundaries;
     use crate::fixture::{RANKS, on_ranks, two_bricks, two_bricks_by_metis};
 
     #[test]
@@ -70,6 +85,22 @@ mod tests {
                 twins.len()
             });
             assert_eq!(found.iter().sum::<usize>(), 27 + 2);
+        }
+    }
+
+    #[test]
+    fn boxes_with_equal_neighbourhoods_are_alike() {
+        let long = two_bricks(&["body.lower.brick.cells=[12, 2, 2]", "body.upper.brick.cells=[2, 2, 2]"]);
+        for ranks in RANKS {
+            let found = on_ranks(&long, ranks, |setup| {
+                let boundaries = boundaries(&setup.gather, setup.subdomains().len());
+                let body = |s: &Subdomain| s.body;
+                let alike = alike(setup.comm, setup.subdomains(), &boundaries);
+                setup.subdomains().iter().map(body).zip(alike).collect::<Vec<_>>()
+            });
+            let mut lower: Vec<usize> = found.concat().into_iter().filter(|(b, _)| *b == 0).map(|(_, n)| n).collect();
+            lower.sort_unstable();
+            assert_eq!(lower, [1, 1, 4, 4, 4, 4], "one is held, one has no neighbour on one side");
         }
     }
 

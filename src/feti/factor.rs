@@ -158,7 +158,7 @@ impl Factors {
 
     /// From now on an own subdomain has the factor of a congruent one with equal stiffness.
     pub fn share(&mut self, own: usize, twin: usize) {
-        self.factors.share(own, twin);
+        self.factors.share(own, twin, true);
     }
 
     /// Bytes of factors that one [`Factors::solve`] reads, forward and backward.

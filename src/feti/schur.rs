@@ -123,20 +123,32 @@ struct Values {
     interior: Option<Factor>,
 }
 
+/// As many must be alike, wherever they are, to be worked on together: a solve for [`WIDTH`] takes a good two solves for
+/// one (`benches/kernels.rs`).
+const TOGETHER: usize = 3;
+
 /// `S` of all own subdomains.
 pub struct Schur {
     splits: Vec<Rc<Split>>,
     values: Stock<Values>,
     /// Of new interior factors, which may fail and be made in double precision; `None` without such factors.
     precision: Option<Precision>,
+    /// Which own subdomains are worked on together with those that have the same values.
+    together: Vec<bool>,
     workspace: Workspace,
     block: Vec<f64>,
 }
 
 impl Schur {
     /// For subdomains with these analyses and boundaries (ascending); equal ones share what follows from them. The
-    /// interior follows the boundary if a `precision` for its factor is given. Nothing is factorised yet.
-    pub fn new(whole: &[Rc<Symbolic>], boundaries: Vec<Vec<u32>>, precision: Option<Precision>) -> Self {
+    /// interior follows the boundary if a `precision` for its factor is given. `alike` tells how many congruent
+    /// subdomains have the same boundary, on all ranks. Nothing is factorised yet.
+    pub fn new(
+        whole: &[Rc<Symbolic>],
+        boundaries: Vec<Vec<u32>>,
+        alike: &[usize],
+        precision: Option<Precision>,
+    ) -> Self {
         let mut splits: Vec<Rc<Split>> = Vec::new();
         for (own, boundary) in boundaries.into_iter().enumerate() {
             let twin = (0..own).find(|&k| Rc::ptr_eq(&whole[k], &whole[own]) && splits[k].boundary == boundary);
@@ -147,7 +159,8 @@ impl Schur {
         }
         let workspace = Workspace::new(splits.iter().filter_map(|s| s.interior.as_ref()).map(|i| &i.cholesky));
         let values = Stock::new(splits.iter().map(|split| split.values(precision)));
-        Self { splits, values, precision, workspace, block: Vec::new() }
+        let together = alike.iter().map(|&count| count >= TOGETHER).collect();
+        Self { splits, values, precision, together, workspace, block: Vec::new() }
     }
 
     /// Local unknowns on the boundary of an own subdomain, ascending.
@@ -162,7 +175,7 @@ impl Schur {
     /// If the interior block is not positive definite; `subdomain` is named in the message.
     pub fn update(&mut self, own: usize, subdomain: usize, stiffness: &[f64], common: bool) -> Result<(), NotDefinite> {
         let split = &*self.splits[own];
-        let values = self.values.renew(own, common, || split.values(self.precision));
+        let values = self.values.renew(own, common && self.together[own], || split.values(self.precision));
         let refill = |to: &mut Vec<f64>, from: &Entries| {
             to.clear();
             to.extend(from.values(stiffness));
@@ -204,7 +217,7 @@ impl Schur {
 
     /// From now on an own subdomain has the values of a congruent one with equal stiffness and boundary.
     pub fn share(&mut self, own: usize, twin: usize) {
-        self.values.share(own, twin);
+        self.values.share(own, twin, self.together[own]);
     }
 
     /// `forces = S t`, both on the boundaries of all own subdomains.
@@ -347,8 +360,12 @@ mod tests {
             let symbolic = analyse(setup.subdomains());
             let values = elastic(&setup.subdomains()[0], setup.material(0), &symbolic[0].pattern);
             let forces = |shared: bool| {
-                let mut schur =
-                    Schur::new(&symbolic, boundaries(&setup.gather, symbolic.len()), Some(Precision::Double));
+                let mut schur = Schur::new(
+                    &symbolic,
+                    boundaries(&setup.gather, symbolic.len()),
+                    &vec![TOGETHER; symbolic.len()],
+                    Some(Precision::Double),
+                );
                 for own in 0..symbolic.len() {
                     schur.update(own, own, &values, false).expect("definite");
                 }
@@ -377,7 +394,8 @@ mod tests {
                 [(None, 1e-14), (Some(Precision::Double), 1e-12), (Some(Precision::Single), 1e-4)]
             {
                 let found = |shared: bool, common: bool| {
-                    let mut schur = Schur::new(&symbolic, boundaries(&setup.gather, count), precision);
+                    let mut schur =
+                        Schur::new(&symbolic, boundaries(&setup.gather, count), &vec![TOGETHER; count], precision);
                     for own in 0..count {
                         match (0..own).find(|&k| shared && schur.alike(own, k)) {
                             Some(twin) => schur.share(own, twin),

@@ -50,10 +50,10 @@ impl<T> Stock<T> {
         Rc::get_mut(&mut self.items[own]).expect("nobody else has it")
     }
 
-    /// From now on an own subdomain has the item of its twin.
-    pub fn share(&mut self, own: usize, twin: usize) {
+    /// From now on an own subdomain has the item of its twin; `common` as in [`Stock::renew`].
+    pub fn share(&mut self, own: usize, twin: usize, common: bool) {
         self.items[own] = Rc::clone(&self.items[twin]);
-        self.common[own] = true;
+        self.common[own] = common;
         self.batches.take();
     }
 
@@ -103,7 +103,7 @@ mod tests {
         *stock.renew(1, true, || unreachable!("nobody shares it")) = 7;
         assert_eq!(stock.batches()[1], Batch::Twins(vec![1]));
         for own in [0, 2, 3, 5, 6, 7, 8, 9, 10] {
-            stock.share(own, 1);
+            stock.share(own, 1, true);
         }
         let first = Batch::Twins(vec![0, 1, 2, 3, 5, 6, 7, 8]);
         assert_eq!(stock.batches(), [first, Batch::Alone(4), Batch::Twins(vec![9, 10])]);

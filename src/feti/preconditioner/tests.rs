@@ -31,7 +31,8 @@ impl<'a> Case<'a> {
         let (factors, stiffnesses) = setup.factors();
         let own = stiffnesses.len();
         let whole = analyse(setup.subdomains());
-        let mut schur = Schur::new(&whole, boundaries(&setup.gather, own), dirichlet.then_some(Precision::Double));
+        let mut schur =
+            Schur::new(&whole, boundaries(&setup.gather, own), &vec![1; own], dirichlet.then_some(Precision::Double));
         for (k, values) in stiffnesses.iter().enumerate() {
             schur.update(k, k, values, false).expect("the interior is held by its boundary");
         }
