@@ -3,6 +3,8 @@
 import json
 import pathlib
 
+from .markdown import table
+
 HEAD = """\
 # Kernels, measured
 
@@ -14,12 +16,15 @@ of a machine with 2 (AMD EPYC, Zen 3): the best of several runs each. Cubes of n
   boundary at its end.
 - *solve*: `K^+` for one vector; *Schur*: one application of `S`. *of twins*: the same where {count} congruent subdomains share
   their factors, per subdomain.
+- *CHOLMOD*: Debian's, supernodal, with OpenBLAS and the better of its own orderings, double precision, the same matrix up to
+  the shift ([peer_cholmod.py](../scripts/peer_cholmod.py)). Its solve finds the factor in the cache, ours does not.
 """
 
 READING = """
 Two factors always win: one factor that eliminates the interior first is {length:.1f} to {length_most:.1f} times as long and takes
 {time:.1f} to {time_most:.1f} times as long as both together, so the program does not offer it. Twins are worth a factor of
 {twins:.1f} to {twins_most:.1f} in a solve.
+faer's factor (which is ours) takes {cholmod:.2f} to {cholmod_most:.2f} of CHOLMOD's time.
 """
 
 
@@ -27,41 +32,45 @@ def ms(seconds):
     return f"{1e3 * seconds:.3g}"
 
 
-def table(head, rows):
-    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+def limits(file: pathlib.Path) -> dict:
+    """Of one core: rates of multiplying matrices and of reading memory."""
+    lines = (json.loads(line) for line in file.read_text().splitlines())
+    return next(line for line in lines if line["kind"] == "machine")
 
 
 def write(file: pathlib.Path) -> str:
     """The page for the lines of a file."""
     lines = [json.loads(line) for line in file.read_text().splitlines()]
-    machine = next(line for line in lines if line["kind"] == "machine")
+    machine = limits(file)
     cubes = [line for line in lines if line["kind"] == "subdomain"]
     coarse = [line for line in lines if line["kind"] == "coarse"]
+    cholmod = {line["cells"]: line for line in lines if line["kind"] == "cholmod"}
     peak = {"single": machine["gemm_single_gflops"], "double": machine["gemm_double_gflops"]}
     width = {"single": 4, "double": 8}
     rows = []
     for cube in cubes:
         factor, precision = cube["factor"], cube["precision"]
         rate = factor["flops"] / factor["seconds"] / 1e9
+        peer = cholmod[cube["cells"]] if precision == "double" else None
         read = 2 * width[precision] * factor["length"] / cube["solve"] / 1e9
         rows.append([
             f"{cube['cells']}, {precision}", str(cube["dofs"]), ms(cube["assembly"]), ms(factor["seconds"]),
             f"{rate:.0f} ({100 * rate / peak[precision]:.0f} %)", ms(cube["interior_factor"]),
             ms(cube["interior_first"]["seconds"]), ms(cube["solve"]), f"{read:.0f}", ms(cube["solve_twins"]),
-            ms(cube["schur"]), ms(cube["schur_twins"]),
+            ms(cube["schur"]), ms(cube["schur_twins"]), *((ms(peer["factor"]), ms(peer["solve"])) if peer else ("", "")),
         ])
     head = ["n, precision", "unknowns", "assembly ms", "whole factor ms", "GF/s (of matrix product)", "interior ms",
-            "interior first ms", "solve ms", "GB/s", "of twins ms", "Schur ms", "of twins ms"]
+            "interior first ms", "solve ms", "GB/s", "of twins ms", "Schur ms", "of twins ms", "CHOLMOD factor ms", "solve ms"]
     lengths = [cube["interior_first"]["length"] / cube["factor"]["length"] for cube in cubes]
     times = [cube["interior_first"]["seconds"] / (cube["factor"]["seconds"] + cube["interior_factor"]) for cube in cubes]
+    ours = [c["factor"]["seconds"] / cholmod[c["cells"]]["factor"] for c in cubes if c["precision"] == "double"]
     twins = [cube["solve"] / cube["solve_twins"] for cube in cubes]
     text = [HEAD.format(count=8), "Limits of one core: product of two matrices of 512 x 512 "
             f"{peak['single']:.0f} GF/s in single and {peak['double']:.0f} GF/s in double precision; reading memory in order "
             f"{machine['read_gb_per_s']:.0f} GB/s (one stream, not prefetched by hand).\n"]
     text += [table(head, rows)]
     text += [READING.format(length=min(lengths), length_most=max(lengths), time=min(times), time_most=max(times),
-                            twins=min(twins), twins_most=max(twins))]
+                            twins=min(twins), twins_most=max(twins), cholmod=min(ours), cholmod_most=max(ours))]
     text += ["## The coarse problem\n", "`G G'` of tiny subdomains (one cell each), sparse Cholesky factor on one core, in seconds.\n"]
     text += [table(
         ["subdomains", "numbers in the factor", "set-up", "again for another set of rows", "one solve", "one projection"],

@@ -14,8 +14,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 RAW = ROOT / "bench-results" / "raw"
 
 
-def run(runs, repeat):
-    """All runs (level, Variant, ranks), the whole list `repeat` times, so that a slow spell does not hit one kind only."""
+def run(runs, repeat, quiet):
+    """All runs (level, Variant, ranks), the whole list `repeat` times, so that a slow spell does not hit one kind only. `quiet`
+    says that nothing else runs on the machine."""
     if not runs:
         sys.exit("scripts/tables: nothing to measure with these --levels and --variants")
     subprocess.run(["scripts/setup"], cwd=ROOT, check=True)
@@ -30,7 +31,7 @@ def run(runs, repeat):
         for level, variant, ranks in runs:
             record = solve(level, variant, ranks, environment)
             record["repetition"] = repetition
-            record["provenance"].update(machine)
+            record["provenance"].update(machine, quiet=quiet)
             with open(file, "a") as lines:
                 lines.write(json.dumps(record) + "\n")
             failed += record["exit_code"] != 0

@@ -6,6 +6,7 @@ import statistics
 import sys
 
 from . import kernels, plot
+from .markdown import table
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "bench-results"
@@ -45,6 +46,20 @@ How to read them:
 """
 
 
+DEFAULT = "active-set/dirichlet/cascade"
+"""What the program does by itself."""
+
+PROFILE = """\
+`{variant}` at level {level} on {ranks} ranks, the run of median time{coarser}. Each phase is on its slowest rank; waiting for
+other ranks counts as the phase that waits, and again as messages at the end. Rates are of the work that must be done:
+additions and multiplications of the factors, and bytes of the factors that each application reads, shared ones once for
+all that are solved together. They stand against the limits of as many cores as there are ranks, taken one at a time
+([kernels.md](kernels.md)): the product of matrices in single precision, and reading memory in order. A solve for eight at
+once does eight times the work on what it reads, so `dual operator` and `preconditioner` lie between both limits.
+
+"""
+
+
 class Group:
     """The repetitions of one kind of run, made by one commit: the one that was measured last."""
 
@@ -56,6 +71,8 @@ class Group:
         self.records.sort(key=lambda record: record["summary"]["time_total"])
         self.summaries = [record["summary"] for record in self.records]
         self.first = self.summaries[0]
+        # Whether times mean something: not where the machine was busy with other work.
+        self.timed = all(record["provenance"].get("quiet", True) for record in self.records)
 
     def count(self, key):
         """A number that must not differ between repetitions."""
@@ -70,7 +87,13 @@ class Group:
         return self.count(key) + sum(row[key] for row in coarser) if coarser else None
 
     def seconds(self, value):
+        if not self.timed:
+            return ""
         return spread([value(summary) for summary in self.summaries])
+
+    def wall(self):
+        """From the start of the processes to their end."""
+        return spread([record["seconds"] for record in self.records]) if self.timed else ""
 
     def median(self):
         """The median of the times."""
@@ -125,11 +148,6 @@ def until_papers_criterion(summary):
     return rows[: met + 1]
 
 
-def table(head, rows):
-    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
-
-
 def cost_table(groups, paper):
     """What a level costs: the paper's column, then ours."""
 
@@ -179,7 +197,7 @@ def cost_table(groups, paper):
             "",
             lambda g: g.seconds(lambda s: sum(r["seconds"] for r in s["cascade"])) if g.first["cascade"] else "",
         ),
-        row("... with start and end of the processes", "", lambda group: spread([r["seconds"] for r in group.records])),
+        row("... with start and end of the processes", "", lambda group: group.wall()),
         row("memory [MiB]", "", lambda group: group.seconds(lambda summary: summary["peak_rss_mb"])),
         row("repetitions", "", lambda group: len(group.records)),
     ]
@@ -300,22 +318,36 @@ def accuracy(levels, references):
 
 
 def profile(levels):
-    """Where the time goes: phases of the fastest variant at the highest level."""
-    level = max(levels.levels)
-    variant, group = min(levels.levels[level].items(), key=lambda item: item[1].median())
+    """Where the time goes: phases of the default at the highest level, each against the machine's limits."""
+    measured_ones = {n: groups for n, groups in levels.levels.items() if any(g.timed for g in groups.values())}
+    level = max(measured_ones)
+    candidates = {v: g for v, g in measured_ones[level].items() if g.timed}
+    variant, group = DEFAULT, candidates.get(DEFAULT)
+    if group is None:
+        variant, group = min(candidates.items(), key=lambda item: item[1].median())
     summary = group.summaries[(len(group.summaries) - 1) // 2]
-    total = summary["time_total"]
+    total, ranks = summary["time_total"], summary["ranks"]
+    limits = kernels.limits(RESULTS / "kernels.jsonl")
+    flops, read = ranks * limits["gemm_single_gflops"], ranks * limits["read_gb_per_s"]
+
+    def against(name, seconds):
+        work = summary.get("work", {}).get(name, {})
+        done = [(work.get("flops", 0), flops, "GF/s"), (work.get("bytes", 0), read, "GB/s")]
+        rates = [(amount / seconds / 1e9, limit, unit) for amount, limit, unit in done if amount]
+        return ", ".join(f"{rate:.3g} of {limit:.3g} {unit} ({100 * rate / limit:.0f} %)" for rate, limit, unit in rates)
+
     phases = sorted(summary["time"].items(), key=lambda phase: -phase[1])
+    rows = [[name, f"{s:.3g}", f"{100 * s / total:.1f} %", against(name, s)] for name, s in phases]
     # Ranks are slow in different phases, so that all together may exceed the total.
-    phases.append(("other", max(0.0, total - sum(seconds for _, seconds in phases))))
-    rows = [[name, f"{seconds:.3g}", f"{100 * seconds / total:.1f} %"] for name, seconds in phases]
-    rows.append(["total", f"{total:.3g}", ""])
-    text = (
-        f"The fastest variant at the highest level: `{variant}` at level {level} on {summary['ranks']} ranks, the run of "
-        f"median time{', coarser levels included' if summary['cascade'] else ''}. Each phase is on its slowest rank; "
-        "waiting for other ranks counts as the phase that waits.\n\n"
+    other = max(0.0, total - sum(seconds for _, seconds in phases))
+    rows += [["other", f"{other:.3g}", f"{100 * other / total:.1f} %", ""], ["total", f"{total:.3g}", "", ""]]
+    for kind, row in summary.get("communication", {}).items():
+        volume = f"{row['megabytes']:.3g} MiB in {thousands(row['calls'])} calls"
+        rows.append([f"of it {kind}", f"{row['seconds']:.3g}", f"{100 * row['seconds'] / total:.1f} %", volume])
+    text = PROFILE.format(
+        variant=variant, level=level, ranks=ranks, coarser=", coarser levels included" if summary["cascade"] else ""
     )
-    return text + table(["phase", "seconds", "share"], rows)
+    return text + table(["phase", "seconds", "share", "rate, all ranks"], rows)
 
 
 def table_1(groups, study, paper):
@@ -344,7 +376,7 @@ def table_1(groups, study, paper):
     return table(head, rows) + "\n" + " ".join(equal) + "\n"
 
 
-DEPENDS_ON_RANKS = {"ranks", "warnings", "time", "time_total", "peak_rss_mb", "memory_estimate_mb", "newton", "cascade"}
+DEPENDS_ON_RANKS = {"ranks", "warnings", "time", "work", "communication", "time_total", "peak_rss_mb", "memory_estimate_mb", "newton", "cascade"}
 
 
 def equality(variant, level, summaries):
