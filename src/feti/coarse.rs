@@ -12,6 +12,7 @@ use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use super::gather::Gather;
 use super::kernel::RigidModes;
 use super::ordering::nested_dissection;
+use super::space::RowSpace;
 use crate::comm::{Comm, Shares, all_gather_u64};
 use crate::constraint::Constraints;
 use crate::decomposition::Subdomain;
@@ -127,14 +128,50 @@ impl<'a> Coarse<'a> {
 
     /// `G rows`, whole on every rank. One all-gather.
     pub fn apply(&self, rows: &[f64]) -> Vec<f64> {
-        let mut mine = vec![0.0; MODES * self.own_slots.len()];
-        for (sum, slots) in mine.chunks_exact_mut(MODES).zip(&self.own_slots) {
+        self.share(self.resultants(rows).as_flattened())
+    }
+
+    /// As [`Coarse::apply`], and in the same all-gather the square of `rows`, and its inner products with each of
+    /// `against`, then those of `pairs`.
+    pub fn apply_with_products(
+        &self,
+        space: &RowSpace,
+        rows: &[f64],
+        against: &[&[f64]],
+        pairs: &[(&[f64], &[f64])],
+    ) -> (Vec<f64>, f64, Vec<f64>) {
+        let mut all = vec![(rows, rows)];
+        all.extend(against.iter().map(|other| (rows, *other)));
+        all.extend(pairs);
+        let (width, partial) = (all.len(), space.partial(&all));
+        let mut mine = Vec::with_capacity((MODES + width) * self.own_slots.len());
+        for (six, values) in self.resultants(rows).iter().zip(partial.chunks_exact(width)) {
+            mine.extend_from_slice(six);
+            mine.extend_from_slice(values);
+        }
+        let all = self.comm.all_gather(&mine, &self.shares.counts(MODES + width));
+        let mut sums = vec![0.0; width];
+        let mut result = Vec::with_capacity(MODES * self.shares.total());
+        for of_subdomain in all.chunks_exact(MODES + width) {
+            let (six, values) = of_subdomain.split_at(MODES);
+            result.extend_from_slice(six);
+            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        }
+        let square = sums.remove(0);
+        (result, square, sums)
+    }
+
+    /// `G rows` of the own subdomains.
+    fn resultants(&self, rows: &[f64]) -> Vec<[f64; MODES]> {
+        let of_subdomain = |slots: &Vec<(u32, u32)>| {
+            let mut sum = [0.0; MODES];
             for &(row, slot) in slots {
                 let x = rows[row as usize];
                 sum.iter_mut().zip(&self.slot_modes[slot as usize]).for_each(|(s, g)| *s += g * x);
             }
-        }
-        self.share(&mine)
+            sum
+        };
+        self.own_slots.iter().map(of_subdomain).collect()
     }
 
     /// Brings six numbers an own subdomain to every rank.

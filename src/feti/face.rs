@@ -4,6 +4,7 @@
 //! `P_A = I_A - G_A'(G_A G_A')^-1 G_A` onto what keeps the balance and leaves open contacts without force.
 
 use super::coarse::{Coarse, CoarseFactor, Floating};
+use super::space::RowSpace;
 
 /// The kept rows with their factor.
 pub struct CoarseFace {
@@ -49,6 +50,25 @@ impl CoarseFace {
         self.mask(rows);
     }
 
+    /// As [`CoarseFace::project`]; returns the squared norm of `P_A rows`, and inner products of `I_A rows` with each of
+    /// `against`, then of `pairs`. One all-gather.
+    pub fn project_with_products(
+        &self,
+        coarse: &Coarse,
+        space: &RowSpace,
+        rows: &mut [f64],
+        against: &[&[f64]],
+        pairs: &[(&[f64], &[f64])],
+    ) -> (f64, Vec<f64>) {
+        self.mask(rows);
+        let (mut a, square, products) = coarse.apply_with_products(space, rows, against, pairs);
+        let e = a.clone();
+        self.factor.solve(&mut a);
+        coarse.add_transpose(-1.0, &a, rows);
+        self.mask(rows);
+        (without(square, &e, &a), products)
+    }
+
     /// Adds to the kept rows the least that changes `G rows` by `e`. Local.
     pub fn add_balance(&self, coarse: &Coarse, mut e: Vec<f64>, rows: &mut [f64]) {
         self.factor.solve(&mut e);
@@ -58,6 +78,13 @@ impl CoarseFace {
             *r += c;
         }
     }
+}
+
+/// `|P x|^2 = x'x - e'a` with `e = G x` and `a = (G G')^-1 e`.
+pub(super) fn without(square: f64, e: &[f64], a: &[f64]) -> f64 {
+    let rest = square - e.iter().zip(a).map(|(e, a)| e * a).sum::<f64>();
+    // What is not a number stays so.
+    if rest < 0.0 { 0.0 } else { rest }
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! `P = I - G'(G G')^-1 G`, the orthogonal projector onto `Ker G`, and the rigid amplitudes that go with it.
 
 use super::coarse::Coarse;
+use super::face::without;
+use super::space::RowSpace;
 
 /// The natural coarse grid projector.
 pub struct Projector<'a> {
@@ -15,6 +17,22 @@ impl Projector<'_> {
         self.coarse.solve(&mut a);
         self.coarse.add_transpose(-1.0, &a, rows);
         a
+    }
+
+    /// As [`Projector::project`]; returns the squared norm of `P rows`, and inner products of `rows` before with each of
+    /// `against`, then of `pairs`. One all-gather.
+    pub fn project_with_products(
+        &self,
+        space: &RowSpace,
+        rows: &mut [f64],
+        against: &[&[f64]],
+        pairs: &[(&[f64], &[f64])],
+    ) -> (f64, Vec<f64>) {
+        let (mut a, square, products) = self.coarse.apply_with_products(space, rows, against, pairs);
+        let e = a.clone();
+        self.coarse.solve(&mut a);
+        self.coarse.add_transpose(-1.0, &a, rows);
+        (without(square, &e, &a), products)
     }
 
     /// The smallest `rows` with `G rows = e`: `G'(G G')^-1 e`. Local.

@@ -33,15 +33,20 @@ impl<'a> RowSpace<'a> {
         &self.owned
     }
 
-    /// `x'y` of each pair; one collective.
+    /// `x'y` of each pair; one reduction.
     pub fn dots(&self, pairs: &[(&[f64], &[f64])]) -> Vec<f64> {
+        self.sum(&self.partial(pairs), pairs.len())
+    }
+
+    /// The parts of `x'y` that count for each own subdomain, pair by pair.
+    pub fn partial(&self, pairs: &[(&[f64], &[f64])]) -> Vec<f64> {
         let mut partial = Vec::with_capacity(self.owned.len() * pairs.len());
         for rows in &self.owned {
             for (x, y) in pairs {
                 partial.push(rows.iter().map(|&r| x[r as usize] * y[r as usize]).sum());
             }
         }
-        self.sum(&partial, pairs.len())
+        partial
     }
 
     /// Sums of `width` values per own subdomain over all subdomains.

@@ -33,6 +33,8 @@ pub struct Dual<'s, 'a> {
     pub projector: &'s Projector<'a>,
     /// `M`.
     pub preconditioner: Option<&'s mut Preconditioner<'a>>,
+    /// Inner products of multipliers.
+    pub space: &'s RowSpace<'s>,
     /// Where the time goes.
     pub timer: &'s Timer,
     /// Told the applications of F so far.
@@ -64,6 +66,17 @@ impl Operator for Dual<'_, '_> {
 impl Projection for Dual<'_, '_> {
     fn project(&mut self, x: &mut [f64]) {
         self.timer.time("coarse problem", || self.projector.project(x));
+    }
+
+    fn project_with_products(
+        &mut self,
+        _: &dyn Space,
+        x: &mut [f64],
+        against: &[&[f64]],
+        pairs: &[(&[f64], &[f64])],
+    ) -> (f64, Vec<f64>) {
+        let projector = self.projector;
+        self.timer.time("coarse problem", || projector.project_with_products(self.space, x, against, pairs))
     }
 }
 
@@ -103,6 +116,18 @@ impl Operator for DualFace<'_, '_> {
 impl Projection for DualFace<'_, '_> {
     fn project(&mut self, x: &mut [f64]) {
         self.dual.timer.time("coarse problem", || self.rows.project(self.coarse(), x));
+    }
+
+    fn project_with_products(
+        &mut self,
+        _: &dyn Space,
+        x: &mut [f64],
+        against: &[&[f64]],
+        pairs: &[(&[f64], &[f64])],
+    ) -> (f64, Vec<f64>) {
+        let (dual, coarse) = (&self.dual, self.coarse());
+        let project = || self.rows.project_with_products(coarse, dual.space, x, against, pairs);
+        dual.timer.time("coarse problem", project)
     }
 }
 

@@ -150,6 +150,7 @@ impl<'a> StepSolver<'a> {
             operator: &mut self.operator,
             projector: &self.projector,
             preconditioner: self.preconditioner.as_mut(),
+            space: problem.space,
             timer,
             alive: &|applications| alive(applications - before),
         };

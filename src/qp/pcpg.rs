@@ -5,13 +5,18 @@
 //! and restores the convergence that round-off takes. Rows that are to stay zero are the projector's affair: if P maps
 //! onto vectors that vanish there, so do all directions.
 //!
-//! The residual b - A x is carried *unprojected*, so that a caller who changes P or moves x goes on from it.
+//! The residual b - A x is carried *unprojected*, so that a caller who changes P or moves x goes on from it. Beside it goes
+//! the projected one with its norm, by recurrences: an iteration has three collectives, for P M P r, for the kept
+//! directions, and for P A p with all other inner products.
 
 use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics, axpy};
 
 /// Directions kept (two vectors each); beyond that the oldest is replaced.
 const KEPT: usize = 120;
+
+/// Drop of the squared norm from which it is measured again.
+const REFRESH: f64 = 1e-4;
 
 /// How it ended.
 #[derive(Clone, Copy, Debug)]
@@ -63,20 +68,29 @@ impl<'a> Pcpg<'a> {
         limits: &Limits,
     ) -> Report {
         let n = x.len();
-        let (mut inside, mut z) = (vec![0.0; n], vec![0.0; n]);
+        let (mut inside, mut z) = (residual.to_vec(), vec![0.0; n]);
         let mut statistics = Statistics::default();
-        let mut first = None;
+        function.project(&mut inside);
+        let mut square = self.space.dot(&inside, &inside);
+        let first_norm = square.sqrt();
+        // The recurrence of the norm rounds relative to where it began.
+        let mut measured = square;
         loop {
-            inside.copy_from_slice(residual);
-            function.project(&mut inside);
-            let norm = self.space.norm(&inside);
-            let first_norm = *first.get_or_insert(norm);
+            let norm = square.sqrt();
             let report = |outcome, statistics| Report { outcome, statistics, first_norm, norm };
             if !norm.is_finite() {
                 return report(Outcome::NotFinite, statistics);
             }
-            if norm <= limits.target(first_norm) {
+            let small = norm <= limits.target(first_norm);
+            if small && square == measured {
                 return report(Outcome::Converged, statistics);
+            }
+            if small || square < REFRESH * measured {
+                inside.copy_from_slice(residual);
+                function.project(&mut inside);
+                square = self.space.dot(&inside, &inside);
+                measured = square;
+                continue;
             }
             if statistics.hessian >= limits.products {
                 return report(Outcome::LimitReached, statistics);
@@ -92,16 +106,24 @@ impl<'a> Pcpg<'a> {
             let mut ap = vec![0.0; n];
             function.apply(&z, &mut ap);
             statistics.hessian += 1;
-            let d = self.space.dots(&[(&z, &ap), (&z, &inside)]);
-            let (curvature, slope) = (d[0], d[1]);
+            let mut projected = ap.clone();
+            let (square_ap, d) =
+                function.project_with_products(self.space, &mut projected, &[&z, &inside], &[(&z, &inside)]);
+            let [curvature, change, slope] = d[..] else { unreachable!("three products were asked for") };
             if !(curvature.is_finite() && slope.is_finite()) {
                 return report(Outcome::NotFinite, statistics);
             }
             if curvature <= 0.0 {
                 return report(Outcome::Unbounded, statistics);
             }
-            axpy(slope / curvature, &z, x);
-            axpy(-slope / curvature, &ap, residual);
+            let step = slope / curvature;
+            axpy(step, &z, x);
+            axpy(-step, &ap, residual);
+            axpy(-step, &projected, &mut inside);
+            square += step * (step * square_ap - 2.0 * change);
+            if square < 0.0 {
+                square = 0.0;
+            }
             statistics.cg += 1;
             let p = std::mem::replace(&mut z, vec![0.0; n]);
             self.keep(Direction { p, ap, curvature });

@@ -32,6 +32,24 @@ pub trait Operator {
 pub trait Projection {
     /// `x = P x`, in place.
     fn project(&mut self, x: &mut [f64]);
+
+    /// `x = P x`, and the squared norm of that, with inner products: of `x` before with each of `against`, then of
+    /// `pairs`. Those who can do it in one collective, do.
+    fn project_with_products(
+        &mut self,
+        space: &dyn Space,
+        x: &mut [f64],
+        against: &[&[f64]],
+        pairs: &[(&[f64], &[f64])],
+    ) -> (f64, Vec<f64>) {
+        let before = x.to_vec();
+        self.project(x);
+        let mut all: Vec<(&[f64], &[f64])> = vec![(x, x)];
+        all.extend(against.iter().map(|y| (&before[..], *y)));
+        all.extend(pairs);
+        let mut products = space.dots(&all);
+        (products.remove(0), products)
+    }
 }
 
 /// All that a solver with equality constraints asks of its function: A, P and, if there is one, a preconditioner M.
@@ -60,6 +78,16 @@ impl Operator for Joined<'_> {
 impl Projection for Joined<'_> {
     fn project(&mut self, x: &mut [f64]) {
         self.projection.project(x);
+    }
+
+    fn project_with_products(
+        &mut self,
+        space: &dyn Space,
+        x: &mut [f64],
+        against: &[&[f64]],
+        pairs: &[(&[f64], &[f64])],
+    ) -> (f64, Vec<f64>) {
+        self.projection.project_with_products(space, x, against, pairs)
     }
 }
 
