@@ -1,4 +1,4 @@
-use super::loads::{Traction, add_tractions};
+use super::loads;
 use super::{internal, stiffness};
 use crate::assembly::pattern::Pattern;
 use crate::decomposition::Subdomain;
@@ -207,7 +207,7 @@ fn tractions_add_up_to_traction_times_area_on_any_cut_and_any_ranks() {
         let nodal = same_on_any_ranks(&scene, |setup| {
             let forces = |subdomain: &Subdomain| {
                 let mut forces = vec![0.0; subdomain.dofs()];
-                add_tractions(subdomain, &setup.discrete.tractions, &mut forces);
+                loads::add(subdomain, &setup.discrete.loads, &mut forces);
                 forces
             };
             setup.subdomains().iter().flat_map(forces).collect()
@@ -224,10 +224,9 @@ fn each_triangle_gives_a_third_of_its_force_to_each_corner_and_tractions_on_one_
     let cube = built_in("bar", &["body.bar.brick.cells=[1, 1, 1]", "decomposition.cells=[1, 1, 1]"]);
     on_ranks(&cube, 1, |setup| {
         let subdomain = &setup.subdomains()[0];
-        let Traction { surface, value } = setup.discrete.tractions[0];
-        let pull = Traction { surface, value: value.map(|t| 0.5 * t) };
+        let half = setup.discrete.loads[0].times(0.5);
         let mut forces = vec![0.0; subdomain.dofs()];
-        add_tractions(subdomain, &[pull, pull], &mut forces);
+        loads::add(subdomain, &[half, half], &mut forces);
         let total = 500.0 * 500.0 * 500.0;
         // The diagonal of xmax runs through corners 3 and 5: both triangles meet there.
         for (node, sixths) in [0.0, 1.0, 0.0, 2.0, 0.0, 2.0, 0.0, 1.0].into_iter().enumerate() {
@@ -235,4 +234,63 @@ fn each_triangle_gives_a_third_of_its_force_to_each_corner_and_tractions_on_one_
             assert_eq!(forces[3 * node + 1..][..2], [0.0, 0.0]);
         }
     });
+}
+
+/// The bar, cut into boxes or not at all, with one load for each text.
+fn loaded_bar(cells: [usize; 3], loads: &[String]) -> Scene {
+    let named: Vec<String> = loads.iter().enumerate().map(|(k, load)| format!("load.l{k}={load}")).collect();
+    let cells = format!("decomposition.cells={cells:?}");
+    built_in(
+        "bar",
+        &[&["load.pull.traction=[0, 0, 0]", &cells][..], &named.iter().map(|s| &s[..]).collect::<Vec<_>>()].concat(),
+    )
+}
+
+#[test]
+fn pressure_all_round_is_the_force_of_hydrostatic_stress_and_has_no_resultant() {
+    let faces = ["xmin", "xmax", "ymin", "ymax", "zmin", "zmax"];
+    let pressure: Vec<String> = faces.map(|face| format!("{{surface = 'bar.{face}', pressure = 7}}")).into();
+    on_ranks(&loaded_bar([4, 2, 2], &pressure), 1, |setup| {
+        let subdomain = &setup.subdomains()[0];
+        let mut forces = vec![0.0; subdomain.dofs()];
+        loads::add(subdomain, &setup.discrete.loads, &mut forces);
+        let material = Material::elastic(210.0, 0.29);
+        let stretch = -7.0 * (1.0 - 2.0 * material.poisson) / material.young;
+        let u: Vec<f64> = subdomain.points.as_flattened().iter().map(|x| stretch * x).collect();
+        let mut internal = vec![0.0; subdomain.dofs()];
+        internal::add_forces(subdomain, &material, &[], &u, &mut internal);
+        assert_close(&column(&forces), &column(&internal), 1e-12);
+        let resultants = setup.modes[0].resultants(&subdomain.points, &forces);
+        assert!(size(&resultants) < 1e-12 * size(&forces), "{resultants:?}");
+    });
+}
+
+#[test]
+fn a_body_force_acts_with_force_times_volume_at_the_centre_of_its_body_alone() {
+    let scene = two_bricks(&["load.top={body = \"upper\", body_force = [0.1, 0.2, -0.3]}"]);
+    let sums = |setup: &crate::fixture::Setup| {
+        let mut sums = vec![0.0; 24];
+        for subdomain in setup.subdomains() {
+            let mut forces = vec![0.0; subdomain.dofs()];
+            loads::add(subdomain, &setup.discrete.loads, &mut forces);
+            let sums = &mut sums[12 * subdomain.body..][..12];
+            for (point, force) in subdomain.points.iter().zip(forces.chunks_exact(3)) {
+                for (a, f) in force.iter().enumerate() {
+                    sums[a] += f;
+                    (0..3).for_each(|b| sums[3 + 3 * a + b] += f * point[b]);
+                }
+            }
+        }
+        sums
+    };
+    let sums = on_ranks(&scene, 1, sums).remove(0);
+    assert!(sums[..12].iter().all(|sum| *sum == 0.0), "the lower brick carries no load");
+    for (a, force) in [0.1, 0.2, -0.3].into_iter().enumerate() {
+        let volume = 4.0 * 2.2 * 1.8;
+        assert!((sums[12 + a] - force * volume).abs() < 1e-13 * volume);
+        for (b, centre) in [3.0, 1.1, 3.0].into_iter().enumerate() {
+            let found = sums[15 + 3 * a + b];
+            assert!((found - force * volume * centre).abs() < 1e-13 * volume, "{a} {b} {found}");
+        }
+    }
 }

@@ -11,10 +11,11 @@ use super::contact::Contact;
 use super::decomposition::Decomposition;
 use super::error::Fault;
 use super::held::Held;
+use super::load::Load;
 use super::material::Material;
 use super::solver::Solver;
 use super::step::Step;
-use super::surface::{Face, Load, Support, SurfaceName};
+use super::surface::{Face, Support, SurfaceName};
 
 pub(super) type Checked = Result<(), Fault>;
 
@@ -137,8 +138,22 @@ fn support(scene: &Scene, key: &str, support: &Support) -> Checked {
 }
 
 fn load(scene: &Scene, key: &str, load: &Load) -> Checked {
-    surface(scene, &format!("{key}.surface"), &load.surface)?;
-    all_finite(&format!("{key}.traction"), &load.traction)
+    let place = |name: &SurfaceName| surface(scene, &format!("{key}.surface"), name);
+    match load {
+        Load::Traction { surface, traction } => {
+            place(surface)?;
+            all_finite(&format!("{key}.traction"), traction)
+        }
+        Load::Pressure { surface, pressure } => {
+            place(surface)?;
+            require(pressure.is_finite(), &format!("{key}.pressure"), pressure, "must be a finite number")
+        }
+        Load::BodyForce { body, body_force } => {
+            let key_body = format!("{key}.body");
+            require(scene.body.contains_key(body), &key_body, body, known("body", scene.body.keys()))?;
+            all_finite(&format!("{key}.body_force"), body_force)
+        }
+    }
 }
 
 fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {

@@ -13,6 +13,7 @@ mod decomposition;
 mod error;
 mod held;
 pub mod library;
+mod load;
 mod material;
 mod overrides;
 mod read;
@@ -30,10 +31,11 @@ pub use contact::{Contact, Obstacle};
 pub use decomposition::{Decomposition, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use held::Held;
+pub use load::Load;
 pub use material::Material;
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
 pub use step::Step;
-pub use surface::{Face, Load, Support, SurfaceError, SurfaceName};
+pub use surface::{Face, Support, SurfaceError, SurfaceName};
 
 /// A study: bodies, what holds and loads them, where they touch, how to cut and how to solve.
 ///
@@ -51,7 +53,7 @@ pub struct Scene {
     pub body: BTreeMap<String, Body>,
     /// Prescribed displacements by name.
     pub support: BTreeMap<String, Support>,
-    /// Tractions by name; several on one surface add up.
+    /// Tractions, pressures and body forces by name; those at one place add up.
     pub load: BTreeMap<String, Load>,
     /// Contacts by name.
     pub contact: BTreeMap<String, Contact>,
@@ -124,7 +126,7 @@ impl Scene {
 
     fn settle_surfaces(&mut self) {
         let supports = self.support.values_mut().map(|s| &mut s.surface);
-        let loads = self.load.values_mut().map(|l| &mut l.surface);
+        let loads = self.load.values_mut().filter_map(Load::surface_mut);
         let contacts = self.contact.values_mut().flat_map(Contact::surfaces_mut);
         supports.chain(loads).chain(contacts).for_each(|surface| surface.settle(self.body.keys()));
     }
@@ -146,7 +148,7 @@ impl Scene {
     /// Surfaces that supports, loads and contacts name, with repetitions.
     pub fn surfaces(&self) -> impl Iterator<Item = &SurfaceName> {
         let supports = self.support.values().map(|s| &s.surface);
-        let loads = self.load.values().map(|l| &l.surface);
+        let loads = self.load.values().filter_map(Load::surface);
         supports.chain(loads).chain(self.contact.values().flat_map(Contact::surfaces))
     }
 

@@ -1,4 +1,4 @@
-//! Surfaces, addressed as `body.surface`, and what happens on them: supports and loads.
+//! Surfaces, addressed as `body.surface`, and the supports on them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -126,14 +126,4 @@ impl Support {
     pub fn prescribed(&self, axis: Axis) -> Option<f64> {
         self.fix.contains(&axis).then(|| self.displacement.map_or(0.0, |values| values[axis.index()]))
     }
-}
-
-/// A uniform dead load on a surface.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Load {
-    /// Where.
-    pub surface: SurfaceName,
-    /// Force per undeformed area, in coordinate directions (a stress).
-    pub traction: [f64; 3],
 }

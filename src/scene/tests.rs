@@ -62,6 +62,11 @@ fn the_library_loads_at_several_levels() {
     }
 }
 
+fn traction(scene: &Scene, load: &str) -> [f64; 3] {
+    let Load::Traction { traction, .. } = scene.load[load] else { panic!("{load} is no traction") };
+    traction
+}
+
 #[test]
 fn two_blocks_is_the_benchmark() {
     let scene = two_blocks(&[]).unwrap();
@@ -72,7 +77,7 @@ fn two_blocks_is_the_benchmark() {
     );
     assert_eq!(scene.body.values().map(|body| body.brick().unwrap().cell_count()).sum::<usize>(), 6000);
     assert_eq!(scene.material["upper"], scene.material["lower"]);
-    assert_eq!(scene.load["top"].traction, [0.0, 0.0, -150.0]);
+    assert_eq!(traction(&scene, "top"), [0.0, 0.0, -150.0]);
     assert_eq!(scene.contact["joint"].slave().to_string(), "upper.zmin");
     assert_eq!(scene.decomposition, Decomposition::Bricks { cells: PAPER_CELLS });
     assert_eq!(scene.solver, Solver::default());
@@ -274,6 +279,36 @@ fn supports_must_agree_where_they_meet() {
 fn loads_are_checked() {
     refuses(&["load.top={surface = 'block.zmax', traction = [0, 0, inf]}"], &["load.top.traction = [0.0, 0.0, inf]"]);
     refuses(&["load.top={surface = 'cube.zmax', traction = [0, 0, 1]}"], &["load.top.surface", "known are block"]);
+    refuses(&["load.top={surface = 'cube.zmax', pressure = 1}"], &["load.top.surface", "known are block"]);
+    refuses(&["load.top={surface = 'block.zmax', pressure = nan}"], &["load.top.pressure = NaN", "finite"]);
+    refuses(&["load.own={body = 'cube', body_force = [0, 0, 1]}"], &["load.own.body", "no such body", "block"]);
+    refuses(&["load.own={body = 'block', body_force = [0, nan, 1]}"], &["load.own.body_force", "finite"]);
+    for (keys, part) in [
+        ("", "missing key `surface`"),
+        ("surface = 'block.zmax', body = 'block', body_force = [0, 0, 1]", "remove either surface or body"),
+        ("surface = 'block.zmax'", "missing key `traction` or `pressure`"),
+        ("surface = 'block.zmax', traction = [0, 0, 1], pressure = 1", "either a traction or a pressure"),
+        ("surface = 'block.zmax', body_force = [0, 0, 1]", "give body = "),
+        ("body = 'block'", "missing key `body_force`"),
+        ("body = 'block', pressure = 1", "give surface = "),
+        ("body = 'block', bodyforce = [0, 0, 1]", "unknown key `bodyforce`"),
+    ] {
+        refuses(&[&format!("load.top={{{keys}}}")], &["load.top", part]);
+    }
+}
+
+#[test]
+fn loads_of_every_kind_read_back() {
+    let loads = [
+        ("{surface = 'block.zmax', traction = [0, 0, 1]}", Some("block.zmax")),
+        ("{surface = 'block.zmax', pressure = 3}", Some("block.zmax")),
+        ("{body = 'block', body_force = [0, 0, -9.81]}", None),
+    ];
+    for (load, surface) in loads {
+        let scene = one(&[&format!("load.top={load}")]).unwrap();
+        assert_eq!(scene.load["top"].surface().map(SurfaceName::to_string).as_deref(), surface);
+        assert_eq!(Scene::from_text(&scene.to_toml(), "again", 1, &[]).unwrap(), scene);
+    }
 }
 
 #[test]
@@ -466,7 +501,7 @@ fn overrides_reach_every_kind_of_value() {
     let Brick { origin, size, .. } = *scene.body["block"].brick().unwrap();
     assert_eq!((origin, size), ([1.0, 2.0, 3.0], [1.0, 1.0, 0.5]));
     assert_eq!(scene.support["base"].surface.face(), Some(Face::Xmin));
-    assert_eq!(scene.load["on top"].traction, [0.0, 0.0, 1.0]);
+    assert_eq!(traction(&scene, "on top"), [0.0, 0.0, 1.0]);
 }
 
 #[test]
@@ -475,7 +510,7 @@ fn later_overrides_win_and_build_on_earlier_ones() {
         ["title=a", "title=b", "load.new.surface=block.zmax", "load.new.traction=[0, 0, 1]", "load.new.traction.2=2"];
     let scene = one(&changes).unwrap();
     assert_eq!(scene.title, "b");
-    assert_eq!(scene.load["new"].traction[2], 2.0);
+    assert_eq!(traction(&scene, "new")[2], 2.0);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::StudyError;
 use super::discrete::Discrete;
-use crate::assembly::loads::{self, Traction};
+use crate::assembly::loads::{self, Load};
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{ConstraintError, Constraints, Support};
 use crate::contact::{ContactError, ContactPair};
@@ -91,11 +91,11 @@ fn refuse_held(
 pub(super) fn stages(scene: &Scene, discrete: &Discrete, zeros: &dyn Fn() -> Torn) -> (Conditions, Vec<Stage>) {
     let RightHandSides { begin, ends } = &discrete.right_hand_sides;
     let loads = |factor: &dyn Fn(&str) -> f64| {
-        let scaled = |(t, name): (&Traction, &String)| Traction { value: t.value.map(|v| factor(name) * v), ..*t };
-        let tractions: Vec<Traction> = discrete.tractions.iter().zip(scene.load.keys()).map(scaled).collect();
+        let scaled = |(load, name): (&Load, &String)| load.times(factor(name));
+        let scaled: Vec<Load> = discrete.loads.iter().zip(scene.load.keys()).map(scaled).collect();
         let mut loads = zeros();
         for (subdomain, f) in discrete.decomposition.subdomains.iter().zip(&mut loads) {
-            loads::add_tractions(subdomain, &tractions, f);
+            loads::add(subdomain, &scaled, f);
         }
         loads
     };

@@ -2,7 +2,7 @@
 
 use super::StudyError;
 use super::conditions::{self, RightHandSides};
-use crate::assembly::loads::Traction;
+use crate::assembly::loads::Load;
 use crate::bodies::Meshes;
 use crate::comm::Comm;
 use crate::constraint::{Constraints, Support, dirichlet};
@@ -30,8 +30,8 @@ pub struct Discrete {
     pub pairs: Vec<ContactPair>,
     /// Supports, in the order of their names.
     pub supports: Vec<Support>,
-    /// Tractions.
-    pub tractions: Vec<Traction>,
+    /// Loads, in the order of their names.
+    pub loads: Vec<Load>,
     /// Own rows of B.
     pub constraints: Constraints,
     /// What the user should know of the meshes.
@@ -59,8 +59,10 @@ pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError
 pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm) -> Result<Discrete, StudyError> {
     let Meshes { bodies, tets, warnings } = Meshes::new(scene, comm)?;
     let materials = scene.body.values().map(|b| material(&scene.material[&b.material])).collect();
+    let number =
+        |name: &str| scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies");
     let surface = |name: &SurfaceName| {
-        let body = scene.body.keys().position(|known| *known == name.body).expect("a checked scene names its bodies");
+        let body = number(&name.body);
         let patch = match (bodies[body].brick(), name.face()) {
             (Some(_), Some(face)) => Patch::Face(Face::ALL[face as usize]),
             _ => Patch::Named(name.surface.clone()),
@@ -105,7 +107,12 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
             scene::Contact::Rigid { rigid: obstacle, .. } => rigid::pair(number, name, &slave, obstacle)?,
         });
     }
-    let tractions = scene.load.values().map(|l| Traction { surface: index(&l.surface), value: l.traction }).collect();
+    let load = |load: &scene::Load| match load {
+        scene::Load::Traction { surface, traction } => Load::Traction { surface: index(surface), value: *traction },
+        scene::Load::Pressure { surface, pressure } => Load::Pressure { surface: index(surface), value: *pressure },
+        scene::Load::BodyForce { body, body_force } => Load::BodyForce { body: number(body), value: *body_force },
+    };
+    let loads = scene.load.values().map(load).collect();
     let contacts: Vec<String> = scene.contact.keys().cloned().collect();
     corner::check(&contacts, &pairs, held)?;
     let given =
@@ -119,7 +126,7 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
         contacts,
         pairs,
         supports,
-        tractions,
+        loads,
         constraints,
         warnings,
         touching,
