@@ -170,8 +170,8 @@ fn coarse(side: usize) {
         Gather::new(&Solo, &decomposition.shares, constraints, subdomains.iter().map(Subdomain::dofs).collect());
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
     let start = Instant::now();
-    let coarse = Coarse::new(&Solo, &decomposition.shares, subdomains, &modes, constraints, &gather);
-    let coarse = coarse.expect("supports hold both bodies");
+    let mut coarse = Coarse::new(&Solo, &decomposition.shares, subdomains, &modes, constraints, &gather);
+    coarse.factorise().expect("supports hold both bodies");
     let setup = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let again = coarse.restricted(|_| true).expect("supports hold both bodies");

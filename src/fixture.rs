@@ -144,6 +144,12 @@ impl<'a> Setup<'a> {
     }
 
     pub fn coarse(&self) -> Result<Coarse<'a>, Floating> {
+        let mut coarse = self.bare_coarse();
+        coarse.factorise().map(|()| coarse)
+    }
+
+    /// Without a factor.
+    pub fn bare_coarse(&self) -> Coarse<'a> {
         let Discrete { decomposition, constraints, .. } = &self.discrete;
         Coarse::new(self.comm, &decomposition.shares, self.subdomains(), &self.modes, constraints, &self.gather)
     }

@@ -35,6 +35,7 @@ use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
 use crate::newton::loading::{self, Progress};
 use crate::newton::{self, Committed, Method, ProgramSettings, Settings, StepRecord, StepSolver, TornProblem, Watch};
+use crate::newton::{equilibrium, recover};
 use crate::qp::mprgp::Expansion;
 use crate::results::fields;
 use crate::results::piece::Piece;
@@ -58,6 +59,9 @@ pub enum StudyError {
     /// Supports contradict each other.
     #[error("{0}")]
     Supports(String),
+    /// Supports, contacts and loads together do not hold a body.
+    #[error("{0}")]
+    Unheld(String),
     /// Some body can move freely.
     #[error(transparent)]
     Floating(#[from] Floating),
@@ -120,7 +124,8 @@ pub fn solve(
     let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
     let space = RowSpace::new(comm, shares, constraints);
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
-    let coarse = timer.time("coarse set-up", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather))?;
+    let mut coarse =
+        timer.time("coarse set-up", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather));
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
     let precision = match scene.solver.precision {
         scene::Precision::Mixed => Precision::Single,
@@ -150,6 +155,11 @@ pub fn solve(
         space: &space,
         yields: discrete.materials.iter().any(|m| m.yield_stress.is_some()),
     };
+    let resultants = |stage: &loading::Stage| recover::resultants(&problem, &coarse, &stage.end.loads);
+    let ends: Vec<Vec<f64>> = stages.iter().map(resultants).collect();
+    equilibrium::check(&coarse, &space, constraints, &ends)
+        .map_err(|unheld| StudyError::Unheld(report::unheld(scene, &unheld)))?;
+    timer.time("coarse set-up", || coarse.factorise())?;
     let solver = &scene.solver;
     let method = match (solver.qp, solver.expansion) {
         (scene::Qp::ActiveSet, _) => Method::ActiveSet,

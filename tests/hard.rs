@@ -137,16 +137,6 @@ fn a_body_that_only_contact_holds_is_warned_of_and_carried() {
     }
 }
 
-#[test]
-fn a_body_that_is_pulled_off_its_only_hold_ends_as_an_outcome() {
-    let run = pressed(315.0, &[]);
-    assert_eq!(run.code, 1, "{}{}", run.stdout, run.stderr);
-    assert!(!run.stderr.contains("panicked"), "{}", run.stderr);
-    let summary = run.summary();
-    assert_eq!(summary["converged"], false);
-    assert!(summary["error"].is_string(), "{}", summary["error"]);
-}
-
 /// Three walls around the top of a block, so slanted that closing a contact opens another: the active sets come back.
 const CYCLE: &str = r#"
 [material.block]

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use thiserror::Error;
 
+use super::bodies::BodyMotions;
 use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use super::gather::Gather;
 use super::kernel::RigidModes;
@@ -41,15 +42,13 @@ pub struct Coarse<'a> {
     slot_modes: Vec<[f64; MODES]>,
     /// For each own subdomain, its (row, slot) in row order.
     own_slots: Vec<Vec<(u32, u32)>>,
+    motions: BodyMotions,
     /// Of all rows; present once the coarse problem is set up.
     factor: Option<CoarseFactor>,
 }
 
 impl<'a> Coarse<'a> {
-    /// Computes `G` and factorises `G G'`. Collective.
-    ///
-    /// # Errors
-    /// If `G G'` is singular: on every rank.
+    /// Computes `G`. Nothing is solved before [`Coarse::factorise`]. Collective.
     pub fn new(
         comm: &'a dyn Comm,
         shares: &Shares,
@@ -57,7 +56,7 @@ impl<'a> Coarse<'a> {
         modes: &[RigidModes],
         constraints: &Constraints,
         gather: &Gather,
-    ) -> Result<Self, Floating> {
+    ) -> Self {
         let slots = constraints.slot_subdomain.len();
         let mut slot_modes = vec![[0.0; MODES]; slots];
         gather.exchange(
@@ -77,17 +76,25 @@ impl<'a> Coarse<'a> {
             },
         );
         let own_slots = gather_own_slots(constraints, gather, subdomains.len());
-        let mut coarse = Self {
+        Self {
             comm,
             shares: shares.clone(),
             slot_begin: constraints.slot_begin.clone(),
             slot_subdomain: constraints.slot_subdomain.clone(),
             slot_modes,
             own_slots,
+            motions: BodyMotions::new(comm, shares, subdomains, modes),
             factor: None,
-        };
-        coarse.factor = Some(coarse.restricted(|_| true)?);
-        Ok(coarse)
+        }
+    }
+
+    /// Factorises `G G'` of all rows. Collective.
+    ///
+    /// # Errors
+    /// If it is singular: on every rank.
+    pub fn factorise(&mut self) -> Result<(), Floating> {
+        self.factor = Some(self.restricted(|_| true)?);
+        Ok(())
     }
 
     /// The factor of `G G'` with only the kept rows of the constraints. Collective.
@@ -95,7 +102,38 @@ impl<'a> Coarse<'a> {
     /// # Errors
     /// If these rows leave a rigid motion free: on every rank.
     pub fn restricted(&self, kept: impl Fn(usize) -> bool) -> Result<CoarseFactor, Floating> {
-        CoarseFactor::new(&share_blocks(self.comm, &self.own_blocks(kept)), self.shares.total())
+        CoarseFactor::new(&self.blocks(kept), self.shares.total())
+    }
+
+    /// The blocks of `G G'` of the kept rows, lower triangle, on every rank. Collective.
+    pub fn blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
+        share_blocks(self.comm, &self.own_blocks(kept))
+    }
+
+    /// Subdomains of all ranks.
+    pub fn subdomains(&self) -> usize {
+        self.shares.total()
+    }
+
+    /// `G' motion` of all rows, of six numbers a subdomain. Local.
+    pub fn moved(&self, motion: &[f64]) -> Vec<f64> {
+        let mut rows = vec![0.0; self.slot_begin.len() - 1];
+        self.add_transpose(1.0, motion, &mut rows);
+        rows
+    }
+
+    /// Rigid motions of whole bodies.
+    pub fn motions(&self) -> &BodyMotions {
+        &self.motions
+    }
+
+    /// Force of a row's unit multiplier on the bodies, six numbers each. Local.
+    pub fn force_on_bodies(&self, row: usize) -> Vec<f64> {
+        let mut forces = vec![0.0; MODES * self.motions.bodies()];
+        for slot in self.slots(row) {
+            self.motions.add_force(self.slot_subdomain[slot] as usize, &self.slot_modes[slot], &mut forces);
+        }
+        forces
     }
 
     /// Block rows of `G G'` that belong to own subdomains, lower triangle. Complete: every row that a subdomain takes
@@ -181,7 +219,7 @@ impl<'a> Coarse<'a> {
 
     /// `(G G')^-1 a`, in place. Local.
     pub fn solve(&self, a: &mut [f64]) {
-        self.factor.as_ref().expect("set up by new").solve(a);
+        self.factor.as_ref().expect("factorised").solve(a);
     }
 
     /// `rows += factor G' a`. Local.
@@ -210,7 +248,7 @@ fn gather_own_slots(constraints: &Constraints, gather: &Gather, own: usize) -> V
 }
 
 /// A 6x6 block of `G G'`, by `(row, column)` subdomain.
-type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;
+pub type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;
 
 /// The blocks of all ranks, on every rank.
 fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
@@ -242,7 +280,11 @@ pub struct CoarseFactor {
 }
 
 impl CoarseFactor {
-    fn new(blocks: &Blocks, subdomains: usize) -> Result<Self, Floating> {
+    /// Of these blocks.
+    ///
+    /// # Errors
+    /// If they are singular.
+    pub fn new(blocks: &Blocks, subdomains: usize) -> Result<Self, Floating> {
         let n = MODES * subdomains;
         let mut columns: Vec<Vec<(u32, f64)>> = vec![Vec::new(); n];
         for (&(row, column), block) in blocks {

@@ -2,24 +2,64 @@
 //!
 //! With `I_A` the mask of these rows it knows `G_A = G I_A`, the factor of `G_A G_A'` and the projector
 //! `P_A = I_A - G_A'(G_A G_A')^-1 G_A` onto what keeps the balance and leaves open contacts without force.
+//!
+//! These rows may leave rigid motions `N` of whole bodies free (`G_A'N = 0`). Then the first subdomain of each body is
+//! tied: with `C` the rows of `N` there, `(G_A G_A' + C C')^-1` is a generalised inverse of `G_A G_A'`, exact for all
+//! right-hand sides orthogonal to `N`, since `N'C C'a = 0` leaves `C'a = 0`.
 
-use super::coarse::{Coarse, CoarseFactor, Floating};
+use super::bodies::BodyMotions;
+use super::coarse::{Blocks, Coarse, CoarseFactor, Floating, MODES};
 use super::space::RowSpace;
 
 /// The kept rows with their factor.
 pub struct CoarseFace {
     kept: Vec<bool>,
     factor: CoarseFactor,
+    /// `N`, six numbers a subdomain.
+    free: Vec<Vec<f64>>,
 }
 
 impl CoarseFace {
     /// Of the rows that are kept. Collective.
     ///
     /// # Errors
-    /// If these rows leave a rigid motion free.
+    /// If these rows leave a motion free that is not one of whole bodies.
     pub fn new(coarse: &Coarse, kept: Vec<bool>) -> Result<Self, Floating> {
-        let factor = coarse.restricted(|row| kept[row])?;
-        Ok(Self { kept, factor })
+        let (mut blocks, motions) = (coarse.blocks(|row| kept[row]), coarse.motions());
+        let subdomains = coarse.subdomains();
+        CoarseFactor::new(&blocks, subdomains)
+            .map(|factor| (factor, Vec::new()))
+            .or_else(|floating| {
+                let free = motions.free(&blocks);
+                if free.is_empty() {
+                    return Err(floating);
+                }
+                let free: Vec<Vec<f64>> = free.iter().map(|motion| motions.amplitudes(motion)).collect();
+                tie(motions, &free, &mut blocks);
+                CoarseFactor::new(&blocks, subdomains).map(|factor| (factor, free))
+            })
+            .map(|(factor, free)| Self { kept, factor, free })
+    }
+
+    /// Rigid motions of whole bodies that the kept rows leave free, six numbers a subdomain.
+    pub fn free(&self) -> &[Vec<f64>] {
+        &self.free
+    }
+
+    /// The part of the forces `e` on all subdomains that the kept rows cannot balance, as a motion. Nothing if it is rounding
+    /// beside forces of this size.
+    pub fn unbalanced(&self, e: &[f64], size: f64) -> Option<Vec<f64>> {
+        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        let along: Vec<f64> = self.free.iter().map(|motion| dot(motion, e)).collect();
+        let longest = |motion: &Vec<f64>| dot(motion, motion).sqrt();
+        let real = self.free.iter().zip(&along).any(|(motion, along)| along.abs() > BALANCED * size * longest(motion));
+        real.then(|| {
+            let mut motion = vec![0.0; e.len()];
+            for (mode, along) in self.free.iter().zip(along) {
+                motion.iter_mut().zip(mode).for_each(|(m, x)| *m += along * x);
+            }
+            motion
+        })
     }
 
     /// Which rows are kept.
@@ -87,6 +127,33 @@ pub(super) fn without(square: f64, e: &[f64], a: &[f64]) -> f64 {
     if rest < 0.0 { 0.0 } else { rest }
 }
 
+/// Forces along a free motion smaller than this share of all are rounding.
+const BALANCED: f64 = 1e-10;
+
+/// Adds `C C'` to the blocks, in their size.
+fn tie(motions: &BodyMotions, free: &[Vec<f64>], blocks: &mut Blocks) {
+    let first = motions.first_subdomains();
+    let size = blocks.values().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
+    for motion in free {
+        let of = |subdomain: usize| &motion[MODES * subdomain..][..MODES];
+        let largest = first.iter().flat_map(|&s| of(s)).fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        let weight = size / (largest * largest);
+        for &row in &first {
+            for &column in first.iter().filter(|&&column| column <= row) {
+                if of(row).iter().all(|x| *x == 0.0) || of(column).iter().all(|x| *x == 0.0) {
+                    continue;
+                }
+                let block = blocks.entry((row, column)).or_insert([0.0; MODES * MODES]);
+                for (i, a) in of(row).iter().enumerate() {
+                    for (j, b) in of(column).iter().enumerate() {
+                        block[MODES * i + j] += weight * a * b;
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use faer::Mat;
@@ -94,6 +161,7 @@ mod tests {
 
     use super::*;
     use crate::fixture::{Setup, assert_close, column, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis};
+    use crate::scene::Scene;
 
     /// Every other contact row is kept.
     fn some(setup: &Setup) -> Vec<bool> {
@@ -125,12 +193,71 @@ mod tests {
         }
     }
 
+    /// The upper brick hangs on contact alone, of which nothing is kept.
+    fn hanging() -> Scene {
+        two_bricks(&["support.right.surface=lower.xmax", "support.right.displacement=[0.0, 0.0, 0.0]"])
+    }
+
+    fn equalities(setup: &Setup) -> Vec<bool> {
+        setup.rows().iter().map(|row| !row.is_inequality()).collect()
+    }
+
+    #[test]
+    fn motions_that_the_kept_rows_leave_free_are_left_alone() {
+        for (scene, freedoms) in
+            [(hanging(), 6), (two_bricks(&["support.right.fix=[\"y\", \"z\"]", "support.right.surface=upper.zmax"]), 1)]
+        {
+            on_ranks(&scene, 1, |setup| {
+                let (coarse, kept) = (setup.bare_coarse(), equalities(setup));
+                let mask = Mat::from_fn(kept.len(), kept.len(), |i, j| f64::from(i == j && kept[i]));
+                let g = setup.dense_modes().transpose() * setup.dense_rows().transpose() * &mask;
+                let face = CoarseFace::new(&coarse, kept).expect("only whole bodies are free");
+                assert_eq!(face.free().len(), freedoms);
+                let mut gram = &g * g.transpose();
+                for motion in face.free() {
+                    let n = column(motion);
+                    let resistance = (g.transpose() * &n).norm_l2() / n.norm_l2();
+                    assert!(resistance < 1e-12, "{resistance:e}");
+                    // Of full rank, and the same on all that is balanced.
+                    gram += &n * n.transpose();
+                }
+                let inverse = |e: Mat<f64>| gram.partial_piv_lu().solve(e);
+
+                let x = setup.multipliers(1);
+                let mut projected = x.clone();
+                face.project(&coarse, &mut projected);
+                let expected = &mask * column(&x) - g.transpose() * inverse(&g * column(&x));
+                assert_close(&column(&projected), &expected, 1e-9);
+
+                let mut masked = setup.multipliers(2);
+                face.mask(&mut masked);
+                let balanced = coarse.apply(&masked);
+                let size = column(&balanced).norm_l2();
+                assert_eq!(face.unbalanced(&balanced, size), None);
+                let mut rows = vec![0.0; x.len()];
+                face.add_balance(&coarse, balanced.clone(), &mut rows);
+                assert_close(&column(&coarse.apply(&rows)), &column(&balanced), 1e-9);
+
+                let push: Vec<f64> = balanced.iter().zip(&face.free()[0]).map(|(b, m)| b + 1e-3 * m).collect();
+                let motion = face.unbalanced(&push, size).expect("it is pushed where it is free");
+                assert!((g.transpose() * column(&motion)).norm_l2() < 1e-12 * column(&motion).norm_l2());
+            });
+        }
+    }
+
     #[test]
     fn projections_are_the_same_bits_on_any_ranks() {
         same_on_any_ranks(&two_bricks_by_metis(7), |setup| {
             let coarse = setup.coarse().expect("the bodies are held");
             let mut x = setup.multipliers(1);
             CoarseFace::new(&coarse, some(setup)).expect("supports hold both bodies").project(&coarse, &mut x);
+            setup.owned(&x)
+        });
+        same_on_any_ranks(&hanging(), |setup| {
+            let coarse = setup.bare_coarse();
+            let face = CoarseFace::new(&coarse, equalities(setup)).expect("only whole bodies are free");
+            let mut x = setup.multipliers(1);
+            face.project(&coarse, &mut x);
             setup.owned(&x)
         });
     }

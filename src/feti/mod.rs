@@ -3,6 +3,7 @@
 //! Notation of the paper: `K` block diagonal stiffness, `B` constraint rows, `R` rigid modes, `G = R'B'`,
 //! `F = B K^+ B'`, `P` the projector onto `Ker G`. Each symbol has a file; none knows of optimisation.
 
+pub mod bodies;
 pub mod cholesky;
 pub mod coarse;
 pub mod coupling;

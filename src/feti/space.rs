@@ -3,7 +3,7 @@
 //! Each row counts for the lowest subdomain of its block. Products are summed per subdomain in row order, then over
 //! the subdomains in their order on rank 0.
 
-use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use crate::comm::{Comm, Shares, all_gather_u64, maximum, ordered_sum};
 use crate::constraint::Constraints;
 
 /// Inner products over all rows of all ranks.
@@ -52,6 +52,19 @@ impl<'a> RowSpace<'a> {
     /// Sums of `width` values per own subdomain over all subdomains.
     pub fn sum(&self, partial: &[f64], width: usize) -> Vec<f64> {
         ordered_sum(self.comm, &self.shares, partial, width)
+    }
+
+    /// What `of` gives for rows, `width` numbers each, of all ranks in one order, on every rank. Collective.
+    pub fn gather(&self, width: usize, of: impl Fn(usize) -> Option<Vec<f64>>) -> Vec<Vec<f64>> {
+        let mine: Vec<u64> = self
+            .owned
+            .iter()
+            .flatten()
+            .filter_map(|&row| of(row as usize))
+            .flat_map(|numbers| numbers.into_iter().map(f64::to_bits))
+            .collect();
+        let numbers: Vec<f64> = all_gather_u64(self.comm, &mine).into_iter().map(f64::from_bits).collect();
+        numbers.chunks_exact(width).map(<[f64]>::to_vec).collect()
     }
 
     /// Largest value over the ranks; NaN if any is.

@@ -1,6 +1,7 @@
 //! The dual problem in the words of the QP solvers: inner products, and `F`, `P`, `M` as one quadratic function, on all
 //! rows or on those of an active set.
 
+use super::motion;
 use crate::constraint::Constraints;
 use crate::feti::coarse::Coarse;
 use crate::feti::face::CoarseFace;
@@ -97,13 +98,40 @@ pub struct DualFace<'s, 'a> {
     pub constraints: &'s Constraints,
     /// `e`, whole on every rank.
     pub balance: &'s [f64],
+    /// Inner products.
+    pub space: &'s RowSpace<'s>,
     /// The rows of the set.
     pub rows: CoarseFace,
 }
 
+/// A contact that a motion closes by less than this share of what it moves elsewhere does not resist it.
+const RESISTS: f64 = 1e-9;
+
 impl DualFace<'_, '_> {
     fn coarse(&self) -> &Coarse<'_> {
         &self.dual.projector.coarse
+    }
+
+    /// Takes contacts in that resist what the rows of the set cannot balance, until nothing is left of it; false if none
+    /// resists.
+    pub fn complete(&mut self, kept: &mut [bool]) -> bool {
+        let size = self.balance.iter().map(|e| e * e).sum::<f64>().sqrt();
+        while let Some(motion) = self.rows.unbalanced(self.balance, size) {
+            let moved = self.coarse().moved(&motion);
+            let most = self.space.maximum(moved.iter().fold(0.0, |most, m| most.max(m.abs())));
+            let mut joined = 0.0;
+            for (kept, _) in kept.iter_mut().zip(&moved).filter(|(kept, m)| !**kept && **m > RESISTS * most) {
+                (*kept, joined) = (true, 1.0);
+            }
+            if self.space.maximum(joined) == 0.0 {
+                return false;
+            }
+            match CoarseFace::new(self.coarse(), kept.to_vec()) {
+                Ok(rows) => self.rows = rows,
+                Err(_) => return false,
+            }
+        }
+        true
     }
 }
 
@@ -138,14 +166,15 @@ impl Quadratic for DualFace<'_, '_> {
 }
 
 impl Face for DualFace<'_, '_> {
-    fn restrict(&mut self, kept: &[bool]) -> bool {
+    fn restrict(&mut self, kept: &mut [bool]) -> bool {
         let timer = self.dual.timer;
         match timer.time("coarse set-up", || CoarseFace::new(self.coarse(), kept.to_vec())) {
             Ok(rows) => self.rows = rows,
             Err(_) => return false,
         }
+        let complete = timer.time("coarse set-up", || self.complete(kept));
         self.dual.restrict_scaling(self.constraints, kept);
-        true
+        complete
     }
 
     fn restore(&mut self, x: &mut [f64]) {
@@ -159,7 +188,7 @@ impl Face for DualFace<'_, '_> {
 
     fn gaps(&mut self, residual: &mut [f64]) {
         self.dual.timer.time("coarse problem", || {
-            let a = self.rows.amplitudes(self.coarse(), residual);
+            let a = motion::amplitudes(&self.rows, self.coarse(), self.space, residual);
             self.coarse().add_transpose(-1.0, &a, residual);
         });
     }

@@ -6,8 +6,10 @@
 pub mod committed;
 pub mod damping;
 pub mod dual;
+pub mod equilibrium;
 pub mod forcing;
 pub mod loading;
+pub mod motion;
 pub mod problem;
 pub mod program;
 pub mod recover;

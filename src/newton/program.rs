@@ -101,9 +101,16 @@ impl Programs {
             return Warm { balance, lambda };
         };
         let mut lambda = last.clone();
-        let missing = balance.iter().zip(projector.coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
-        // Open contacts stay open.
-        face.add_balance(&projector.coarse, missing, &mut lambda);
+        let missing: Vec<f64> = balance.iter().zip(projector.coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
+        let size = balance.iter().map(|e| e * e).sum::<f64>().sqrt();
+        if face.unbalanced(&missing, size).is_none() {
+            // Open contacts stay open.
+            face.add_balance(&projector.coarse, missing, &mut lambda);
+        } else {
+            let mut change = vec![0.0; rows];
+            projector.particular(&missing, &mut change);
+            lambda.iter_mut().zip(change).for_each(|(l, c)| *l += c);
+        }
         Warm { balance, lambda }
     }
 
@@ -185,10 +192,20 @@ impl Programs {
         let space = Multipliers(problem.space, dual.timer);
         let bounded: Vec<bool> = problem.constraints.rows.iter().map(|row| row.is_inequality()).collect();
         let rows = self.take_face(&dual.projector.coarse, bounded.len())?;
-        let start = active_set::Start { x: warm.lambda.clone(), residual, kept: rows.kept().to_vec() };
-        dual.restrict_scaling(problem.constraints, rows.kept());
-        let mut face =
-            DualFace { dual: dual.reborrow(), constraints: problem.constraints, balance: &warm.balance, rows };
+        let mut kept = rows.kept().to_vec();
+        let mut face = DualFace {
+            dual: dual.reborrow(),
+            constraints: problem.constraints,
+            balance: &warm.balance,
+            space: problem.space,
+            rows,
+        };
+        if !face.complete(&mut kept) {
+            let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
+            return Ok(Found { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
+        }
+        face.dual.restrict_scaling(problem.constraints, &kept);
+        let start = active_set::Start { x: warm.lambda.clone(), residual, kept };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let at_floor = self.note(&limits, solution.first_norm);
         let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;

@@ -16,8 +16,9 @@ pub fn resultants(problem: &TornProblem, coarse: &Coarse, forces: &Torn) -> Vec<
     coarse.share(&mine)
 }
 
-/// Adds `R a` to a torn displacement.
-pub fn add_rigid_motion(problem: &TornProblem, amplitudes: &[f64], torn: &mut Torn) {
+/// Adds `factor R a` to a torn displacement.
+pub fn add_rigid_motion(problem: &TornProblem, factor: f64, amplitudes: &[f64], torn: &mut Torn) {
+    let amplitudes: Vec<f64> = amplitudes.iter().map(|a| factor * a).collect();
     for ((subdomain, modes), local) in problem.subdomains.iter().zip(problem.modes).zip(torn) {
         modes.add_motion(&subdomain.points, &amplitudes[MODES * subdomain.id..][..MODES], local);
     }

@@ -4,6 +4,7 @@ use std::rc::Rc;
 
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
+use super::motion;
 use super::problem::{State, TornProblem};
 use super::program::{Found, ProgramSettings, Programs};
 use super::recover;
@@ -160,10 +161,11 @@ impl<'a> StepSolver<'a> {
         let mut du = forces;
         let mut defect = vec![0.0; rows];
         self.respond(&balanced, &mut du, &mut defect, timer);
-        defect.iter_mut().zip(&slack).for_each(|(d, s)| *d = s - *d);
+        defect.iter_mut().zip(&slack).for_each(|(d, s)| *d -= s);
         if let Some(held) = self.programs.held() {
-            let amplitudes = timer.time("coarse problem", || held.amplitudes(&self.projector.coarse, &defect));
-            recover::add_rigid_motion(problem, &amplitudes, &mut du);
+            let coarse = &self.projector.coarse;
+            let back = timer.time("coarse problem", || motion::amplitudes(held, coarse, problem.space, &defect));
+            recover::add_rigid_motion(problem, -1.0, &back, &mut du);
         }
         self.mend(problem, &slack, &mut du, timer);
         let applications = self.operator.applications() - before;

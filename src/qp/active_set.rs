@@ -23,9 +23,9 @@ const ROUNDING: f64 = 1e-13;
 
 /// The problem on the rows of a set. All answers must be the same on all ranks.
 pub trait Face: Quadratic {
-    /// From now on x, P and M live on the kept rows: all others are zero. False if the equalities cannot be met there
-    /// (a body would hang on nothing).
-    fn restrict(&mut self, kept: &[bool]) -> bool;
+    /// From now on x, P and M live on the kept rows: all others are zero. Rows are added where the equalities cannot be met
+    /// without (a body would hang on nothing); false if that does not help.
+    fn restrict(&mut self, kept: &mut [bool]) -> bool;
 
     /// The shortest way into { G x = e, x = 0 off the kept rows }.
     fn restore(&mut self, x: &mut [f64]);
@@ -126,15 +126,15 @@ impl Run<'_> {
                     return Outcome::Converged;
                 }
             }
+            if !face.restrict(&mut self.kept) {
+                return Outcome::Cycled;
+            }
             if self.seen(&history) {
                 if strict {
                     return Outcome::Cycled;
                 }
                 strict = true;
                 history.clear();
-            }
-            if !face.restrict(&self.kept) {
-                return Outcome::Cycled;
             }
             wish.copy_from_slice(&self.x);
         }
@@ -195,9 +195,9 @@ mod tests {
 
     const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
 
-    fn from(torn: &mut Torn, x: Vec<f64>, kept: Vec<bool>, limits: &Limits) -> Solution {
+    fn from(torn: &mut Torn, x: Vec<f64>, mut kept: Vec<bool>, limits: &Limits) -> Solution {
         let bounded = torn.bounded.clone();
-        assert!(torn.restrict(&kept));
+        assert!(torn.restrict(&mut kept));
         let residual = torn.f.times(&x).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();
         solve(&Plain, torn, &bounded, Start { x, residual, kept }, limits)
     }
@@ -217,7 +217,7 @@ mod tests {
             let (rows, carrying) =
                 (torn.bounded.iter().filter(|b| **b).count(), fast.kept.iter().filter(|k| !**k).count());
             assert!(carrying > 0 && carrying < rows, "{carrying} of {rows}");
-            torn.restrict(&fast.kept);
+            torn.restrict(&mut fast.kept.clone());
             let mut gaps = fast.residual.clone();
             torn.gaps(&mut gaps);
             for i in (0..n).filter(|i| torn.bounded[*i]) {
@@ -245,7 +245,7 @@ mod tests {
     fn norm_of_a_dual_problem() {
         let mut torn = Torn::membrane(3, 5);
         let n = torn.d.len();
-        torn.restrict(&vec![true; n]);
+        torn.restrict(&mut vec![true; n]);
         let start = torn.d.clone();
         let found = power::norm(&Plain, &mut torn, &start).expect("an estimate");
         assert!(found.products <= 12);
@@ -257,7 +257,7 @@ mod tests {
         let n = torn.d.len();
         let limits = Limits { products: 5, ..LIMITS };
         assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &limits).outcome, Outcome::LimitReached);
-        assert!(!torn.restrict(&vec![false; n]));
+        assert!(!torn.restrict(&mut vec![false; n]));
         torn.f.entries[3] = f64::NAN;
         assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS).outcome, Outcome::NotFinite);
     }

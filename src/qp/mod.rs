@@ -6,6 +6,7 @@
 //! - [`smalse`]: bounds and equalities, convergence guaranteed; its inner loop is [`mprgp`] on [`bounds`];
 //! - [`pcpg`]: equalities only, with all search directions kept;
 //! - [`active_set`]: guesses the active bounds, solves for equalities, corrects the guess: fast, but without a proof;
+//! - [`nnls`]: small dense nonnegative least squares: whether a force can be made of pushes;
 //! - [`power`]: estimate of the norm of P A P that the penalty and the step lengths are scaled by.
 //!
 //! A solver never fails with an error: it ends with an [`Outcome`] and the best it has.
@@ -13,6 +14,7 @@
 pub mod active_set;
 pub mod bounds;
 pub mod mprgp;
+pub mod nnls;
 pub mod pcpg;
 pub mod power;
 pub mod quadratic;

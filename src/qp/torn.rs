@@ -141,12 +141,12 @@ impl Quadratic for Torn {
 }
 
 impl Face for Torn {
-    fn restrict(&mut self, kept: &[bool]) -> bool {
+    fn restrict(&mut self, kept: &mut [bool]) -> bool {
         self.kept = kept.to_vec();
         self.basis.clear();
         let mut possible = true;
         for row in &self.rows {
-            let inside = row.full.iter().zip(kept).map(|(v, kept)| v * f64::from(*kept)).collect();
+            let inside = row.full.iter().zip(&*kept).map(|(v, kept)| v * f64::from(*kept)).collect();
             let mut row = Row { inside, ..row.clone() };
             for b in &self.basis {
                 let c = -dot(&b.inside, &row.inside);
@@ -179,7 +179,7 @@ impl Face for Torn {
 /// Solves by SMALSE-M with x = x0 + y, x0 the shortest solution of the equalities; returns x.
 pub fn homogenised(torn: &mut Torn, relative: f64) -> Solution {
     let n = torn.d.len();
-    torn.restrict(&vec![true; n]);
+    torn.restrict(&mut vec![true; n]);
     let mut shift = vec![0.0; n];
     torn.restore(&mut shift);
     let b: Vec<f64> = torn.f.times(&shift).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();

@@ -4,6 +4,7 @@ use super::discrete::Discrete;
 use super::sizes::sizes;
 use crate::comm::Comm;
 use crate::constraint::Kind;
+use crate::newton::equilibrium::Unheld;
 use crate::newton::loading::{At, Followed};
 use crate::newton::{self, Solution, StepRecord, TornProblem};
 use crate::results::fields::{self, ContactState};
@@ -13,10 +14,7 @@ use crate::scene::{self, Scene};
 /// Where in the history an attempt leads, in words; scenes without `[[step]]` have no history to speak of.
 pub(super) fn place(scene: &Scene, at: At) -> Option<String> {
     let step = scene.step.get(at.stage)?;
-    let mut text = format!("load step {}", at.stage + 1);
-    if !step.name.is_empty() {
-        text += &format!(" ({})", step.name);
-    }
+    let mut text = load_step(scene, at.stage)?;
     if step.increments > 1 {
         text += &format!(", increment {} of {}", at.increment, step.increments);
     }
@@ -24,6 +22,29 @@ pub(super) fn place(scene: &Scene, at: At) -> Option<String> {
         text += &format!(", up to {:.4} of the step", at.fraction);
     }
     Some(text)
+}
+
+fn load_step(scene: &Scene, stage: usize) -> Option<String> {
+    let name = &scene.step.get(stage)?.name;
+    Some(if name.is_empty() { format!("load step {}", stage + 1) } else { format!("load step {} ({name})", stage + 1) })
+}
+
+/// Why a scene is refused whose supports, contacts and loads do not hold its bodies.
+pub(super) fn unheld(scene: &Scene, unheld: &Unheld) -> String {
+    let Unheld { body, motion, stage, driven } = unheld;
+    let body = scene.body.keys().nth(*body).expect("it is one of the bodies");
+    let when = load_step(scene, *stage).map_or(String::new(), |step| format!(" at the end of {step}"));
+    if *driven {
+        format!(
+            "body.{body}: loads drive its {motion}{when}, and neither supports nor contacts resist: add a support, or a load \
+             that presses it against a contact"
+        )
+    } else {
+        format!(
+            "body.{body}: nothing determines its {motion}{when}: supports leave it free, and no load presses it against a \
+             contact on that way; add a support"
+        )
+    }
 }
 
 /// An increment in numbers.
