@@ -308,6 +308,7 @@ fn solve_level(
     let discrete = timer.time("discretisation", || study::discretise_by_cost(scene, costs.as_deref(), comm))?;
     let sizes = study::sizes(&discrete, comm);
     monitor.event(&Event::Sizes { scene: source.scene.clone(), level, ranks: comm.size(), sizes });
+    discrete.contact_rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
     discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
     if level == source.level {
         warnings(scene, &discrete, comm).into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
@@ -334,11 +335,13 @@ fn check(source: &Source, comm: &dyn Comm) -> Result<i32, Failure> {
         ranks: comm.size(),
         sizes: sizes.clone(),
     });
+    discrete.contact_rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
     discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
     monitor.event(&Event::Memory { megabytes: memory });
     warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
     if let Some(file) = &source.summary {
         let mut summary = Summary { sizes, warnings, title: scene.title.clone(), ..Summary::default() };
+        summary.contacts = discrete.contact_rows.clone();
         summary.memory_estimate_mb = Some(memory);
         summary.mesh_reading_mb = discrete.reading_mb;
         describe_run(&mut summary, source, comm);

@@ -1,6 +1,7 @@
 //! The pipeline from a scene to results: the only file that sees every stage.
 
 mod conditions;
+mod contacts;
 mod discrete;
 mod report;
 mod sizes;

@@ -9,6 +9,11 @@ use serde_json::Value;
 /// A block on a larger one, pressed down and held at one side, down to the contact, where that side moves down too. The
 /// lower block has `cells` along x and y.
 fn summary(cells: [usize; 2], slave: &str, master: &str, sets: &[&str]) -> Value {
+    summary_of(cells, &format!("slave = {slave:?}\nmaster = {master:?}"), sets)
+}
+
+/// As [`summary`] with these keys of the contact.
+fn summary_of(cells: [usize; 2], sides: &str, sets: &[&str]) -> Value {
     let text = format!(
         r#"
         [material.steel]
@@ -35,8 +40,7 @@ fn summary(cells: [usize; 2], slave: &str, master: &str, sets: &[&str]) -> Value
         surface = "upper.zmax"
         traction = [10.0, 0.0, -200.0]
         [contact.joint]
-        slave = "{slave}"
-        master = "{master}"
+        {sides}
         [decomposition]
         subdomains = 8"#,
         cells[0], cells[1]
@@ -59,6 +63,18 @@ fn forces_balance_where_contact_meets_a_support() {
             assert!(left.iter().all(|f| f.abs() < 1e-8 * load[2].abs()), "axis {axis}: {left:?} is left");
         }
         assert!(contact[2] > 0.2 * load[2].abs(), "{contact:?}");
+    }
+}
+
+#[test]
+fn the_program_chooses_the_surface_that_supports_do_not_hold() {
+    let (upper, lower) = ("upper.zmin", "lower.zmax");
+    let named = summary([7, 10], lower, upper, &[]);
+    for surfaces in [[upper, lower], [lower, upper]] {
+        let chosen = summary_of([7, 10], &format!("surfaces = {surfaces:?}"), &[]);
+        assert_eq!(chosen["contacts"], named["contacts"]);
+        assert_eq!(chosen["contacts"][0]["slave"], lower);
+        assert_eq!(chosen["energy"], named["energy"]);
     }
 }
 

@@ -128,6 +128,13 @@ fn a_gap_takes_its_part_of_the_push() {
 }
 
 #[test]
+fn a_gap_that_the_scene_adds_is_one_between_the_meshes() {
+    assert_blocks(10.0, 0.0, 472.5, &["contact.joint.gap=1"]);
+    assert_blocks(2.5, 0.0, 315.0, &["contact.joint.gap=-0.5"]);
+    assert_blocks(10.0, 0.25, 472.5, &["contact.joint.gap=0.75", "body.lower.brick.cells=[6, 4, 4]"]);
+}
+
+#[test]
 fn push_and_gap_shifted_alike_give_the_same_stress() {
     assert_blocks(3.0 + 0.75, 0.75, 315.0, &[]);
 }

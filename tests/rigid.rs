@@ -81,6 +81,7 @@ fn a_cube_on_a_plane_or_a_flat_height_field_is_in_the_state_of_the_closed_form()
         &format!("heightfield = {{ origin = [0.0, -5.0], spacing = [1000.0, 600.0], {heights} }}"),
         &["solver.preconditioner=lumped"],
     );
+    assert_floor("plane = { point = [0.0, 0.0, 1.5], normal = [0.0, 0.0, 1.0] }", &["contact.floor.gap=2"]);
 }
 
 /// The loads press a cube into a corner; it has no supports, and its edges and a vertex are in several contacts.

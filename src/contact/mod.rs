@@ -1,14 +1,16 @@
 //! Contact geometry: which points of two surfaces face each other, normals and gaps. No unknowns, no multipliers.
 //!
 //! Every condition is one on a slave node: against the master node opposite where meshes match ([`matching`]), against
-//! weighted means of master nodes where they do not ([`mortar`]), or against a rigid obstacle ([`rigid`]). Surfaces are two-dimensional, so every rank sees both sides of each contact whole,
-//! for the time of the pairing only; what is kept of it are the pairs.
+//! weighted means of master nodes where they do not ([`mortar`]), or against a rigid obstacle ([`rigid`]). [`pairing`]
+//! finds out which, and which surface is the slave. Surfaces are two-dimensional, so every rank sees both sides of each
+//! contact whole, for the time of the pairing only; what is kept of it are the pairs.
 
 pub mod clip;
 pub mod corner;
 pub mod dual;
 pub mod matching;
 pub mod mortar;
+pub mod pairing;
 pub mod rigid;
 pub mod surface;
 pub mod tree;
@@ -31,7 +33,8 @@ pub struct ContactPair {
     /// Unit vector towards the other side. Between surfaces: the outward normal of the slave surface at the node, mean of
     /// the adjacent triangles' area vectors. At a rigid obstacle: straight into it.
     pub normal: [f64; 3],
-    /// Initial distance along the normal (length); negative where the bodies overlap.
+    /// Initial distance along the normal (length), times the sum of the slave side's weights; negative where the bodies
+    /// overlap.
     pub gap: f64,
     /// Share of the slave surface that belongs to the node: pressure is force on the condition over this area. A third of the
     /// adjacent triangles; of their part that faces the master surface where meshes do not match.
@@ -39,6 +42,18 @@ pub struct ContactPair {
 }
 
 impl ContactPair {
+    /// Puts the other side at this distance along the normal (length).
+    pub fn set_distance(&mut self, distance: f64) {
+        self.gap = 0.0;
+        self.widen(distance);
+    }
+
+    /// Moves the other side away along the normal (length).
+    pub fn widen(&mut self, distance: f64) {
+        let others: f64 = self.others.iter().map(|(_, weight)| weight).sum();
+        self.gap += (1.0 + others) * distance;
+    }
+
     /// Force on the slave surface where the condition is met with this force: the master's nodes take all of it.
     pub fn force(&self, force: f64) -> [f64; 3] {
         let others: f64 = self.others.iter().map(|(_, weight)| weight).sum();

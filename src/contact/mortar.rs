@@ -208,4 +208,4 @@ impl Plane {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

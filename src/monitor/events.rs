@@ -1,7 +1,7 @@
 //! The events of a run.
 
 use super::timing::PhaseTable;
-use crate::results::summary::{NewtonRow, Residuals, Sizes};
+use crate::results::summary::{ContactRow, NewtonRow, Residuals, Sizes};
 
 /// Something that happened and is worth telling; numbers are those of all ranks together.
 #[derive(Clone, Debug)]
@@ -17,6 +17,8 @@ pub enum Event {
         /// Sizes of the problem.
         sizes: Sizes,
     },
+    /// A contact is paired.
+    Contact(ContactRow),
     /// Mesh files are read and sent out.
     Reading {
         /// Largest resident memory of rank 0 until then, in MiB.

@@ -5,7 +5,7 @@
 
 use super::events::{Event, Sink};
 use super::timing::PhaseTable;
-use crate::results::summary::{NewtonRow, Residuals, Sizes};
+use crate::results::summary::{ContactRow, NewtonRow, Residuals, Sizes};
 
 /// Writes log lines.
 #[derive(Default)]
@@ -31,6 +31,7 @@ impl Plain {
                 self.newton_header_written = false;
                 size_lines(scene, *level, *ranks, sizes)
             }
+            Event::Contact(row) => vec![contact_line(row)],
             Event::Reading { megabytes } => vec![format!("  {:<16}{megabytes:>12.0}  MiB, rank 0", "reading meshes")],
             Event::Memory { megabytes } => {
                 vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together", "memory estimate")]
@@ -69,6 +70,11 @@ fn size_lines(scene: &str, level: usize, ranks: usize, sizes: &Sizes) -> Vec<Str
         line("primal unknowns", sizes.primal_dofs, String::new()),
         line("dual unknowns", sizes.dual_dofs, format!("  {glue} gluing + {supports} support + {contact} contact")),
     ]
+}
+
+fn contact_line(ContactRow { name, slave, master, rule, conditions }: &ContactRow) -> String {
+    let sides = master.as_ref().map_or(slave.clone(), |master| format!("{slave} against {master}"));
+    format!("  {:<16}{conditions:>12}  {sides}, {rule}", format!("contact {name}"))
 }
 
 fn newton_header() -> String {
@@ -156,6 +162,21 @@ mod tests {
             ]
         );
         assert_eq!(plain.lines(&Event::NewtonStep(row)), first[1..]);
+    }
+
+    #[test]
+    fn a_contact_says_which_surface_is_the_slave() {
+        let row = ContactRow {
+            name: "joint".into(),
+            slave: "upper.zmin".into(),
+            master: Some("lower.zmax".into()),
+            rule: "mortar".into(),
+            conditions: 275,
+        };
+        let line = |row: ContactRow| Plain::default().lines(&Event::Contact(row)).concat();
+        assert_eq!(line(row.clone()), "  contact joint            275  upper.zmin against lower.zmax, mortar");
+        let floor = ContactRow { master: None, rule: "rigid".into(), ..row };
+        assert_eq!(line(floor), "  contact joint            275  upper.zmin, rigid");
     }
 
     #[test]

@@ -30,6 +30,8 @@ pub struct Summary {
     /// Sizes of the problem.
     #[serde(flatten)]
     pub sizes: Sizes,
+    /// How contacts were paired.
+    pub contacts: Vec<ContactRow>,
     /// Share of the elements with plastic flow in the last increment, 0 to 1.
     pub plastic_fraction: Option<f64>,
     /// Newton steps.
@@ -160,6 +162,21 @@ pub struct Sizes {
     pub dirichlet_rows: u64,
     /// Rows of contact.
     pub contact_rows: u64,
+}
+
+/// How a contact was paired.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ContactRow {
+    /// Its name in the scene.
+    pub name: String,
+    /// The surface whose nodes carry the conditions.
+    pub slave: String,
+    /// The other surface; none at a rigid obstacle.
+    pub master: Option<String>,
+    /// `node to node`, `mortar` or `rigid`.
+    pub rule: String,
+    /// Slave nodes with a condition.
+    pub conditions: u64,
 }
 
 /// Work done by the QP solver in all Newton steps.

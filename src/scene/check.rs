@@ -7,7 +7,7 @@ use std::fmt::Debug;
 
 use super::Scene;
 use super::body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
-use super::contact::Contact;
+use super::contact::{Contact, Sides};
 use super::decomposition::Decomposition;
 use super::error::Fault;
 use super::held::Held;
@@ -157,23 +157,34 @@ fn load(scene: &Scene, key: &str, load: &Load) -> Checked {
 }
 
 fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
-    surface(scene, &format!("{key}.slave"), contact.slave())?;
-    match contact {
-        Contact::Surfaces { slave, master } => {
-            let key = format!("{key}.master");
-            surface(scene, &key, master)?;
-            let rule = "slave and master must be on different bodies; a body does not touch itself";
-            require(slave.body != master.body, &key, master.to_string(), rule)?;
-            let same = |(_, other): &(&String, &Contact)| {
-                let surfaces: Vec<_> = other.surfaces().collect();
-                surfaces.len() == 2 && surfaces.contains(&slave) && surfaces.contains(&master)
-            };
-            let twin = scene.contact.iter().take_while(|(_, other)| !std::ptr::eq(*other, contact)).find(same);
-            let rule = |other: &str| format!("contact.{other} is between the same two surfaces; remove one of the two");
-            twin.map_or(Ok(()), |(other, _)| require(false, &key, master.to_string(), rule(other)))
-        }
-        Contact::Rigid { rigid, .. } => rigid.check(&format!("{key}.rigid")),
+    require(contact.gap.is_finite(), &format!("{key}.gap"), contact.gap, "must be a finite number")?;
+    if let Some(clearance) = contact.clearance {
+        let key = format!("{key}.clearance");
+        require(clearance.is_finite(), &key, clearance, "must be a finite number")?;
+        require(contact.gap == 0.0, &key, clearance, "stands instead of any gap: remove gap, or clearance")?;
     }
+    let (first, second) = match &contact.sides {
+        Sides::Named { .. } => ("slave", "master"),
+        Sides::Either(_) => ("surfaces", "surfaces"),
+        Sides::Rigid { slave, obstacle } => {
+            surface(scene, &format!("{key}.slave"), slave)?;
+            return obstacle.check(&format!("{key}.rigid"));
+        }
+    };
+    let sides: Vec<&SurfaceName> = contact.surfaces().collect();
+    let [one, other] = sides[..] else { unreachable!("an obstacle is not a surface") };
+    surface(scene, &format!("{key}.{first}"), one)?;
+    let key = format!("{key}.{second}");
+    surface(scene, &key, other)?;
+    let rule = "both sides are of one body; a body does not touch itself";
+    require(one.body != other.body, &key, other.to_string(), rule)?;
+    let same = |(_, earlier): &(&String, &Contact)| {
+        let surfaces: Vec<_> = earlier.surfaces().collect();
+        surfaces.len() == 2 && surfaces.contains(&one) && surfaces.contains(&other)
+    };
+    let twin = scene.contact.iter().take_while(|(_, earlier)| !std::ptr::eq(*earlier, contact)).find(same);
+    let rule = |twin: &str| format!("contact.{twin} is between the same two surfaces; remove one of the two");
+    twin.map_or(Ok(()), |(twin, _)| require(false, &key, other.to_string(), rule(twin)))
 }
 
 fn step(scene: &Scene, key: &str, step: &Step) -> Checked {

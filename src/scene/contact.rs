@@ -9,45 +9,57 @@ use super::surface::SurfaceName;
 
 /// A contact. Each slave node carries one condition.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, try_from = "Section")]
-pub enum Contact {
-    /// Between surfaces of two bodies.
-    Surfaces {
+#[serde(try_from = "Section", into = "Section")]
+pub struct Contact {
+    /// What touches what.
+    pub sides: Sides,
+    /// What is added to the distance of the meshes everywhere (length); negative for an overlap.
+    pub gap: f64,
+    /// The distance everywhere, whatever that of the meshes is (length): for surfaces that are meant to fit, where facets
+    /// would leave gaps and overlaps of their own.
+    pub clearance: Option<f64>,
+}
+
+/// The two sides of a contact. The nodes of the slave must not enter the other side.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sides {
+    /// Surfaces of two bodies.
+    Named {
         /// The surface whose nodes are checked.
         slave: SurfaceName,
-        /// The surface of another body, which they must not enter.
+        /// The surface of another body.
         master: SurfaceName,
     },
-    /// With an obstacle that neither moves nor deforms.
+    /// Surfaces of two bodies, either of which may be the slave.
+    Either([SurfaceName; 2]),
+    /// A surface, and an obstacle that neither moves nor deforms.
     Rigid {
         /// The surface whose nodes are checked.
         slave: SurfaceName,
         /// What they must not enter.
-        rigid: Obstacle,
+        obstacle: Obstacle,
     },
 }
 
 impl Contact {
-    /// The surface whose nodes are checked.
-    pub fn slave(&self) -> &SurfaceName {
-        match self {
-            Self::Surfaces { slave, .. } | Self::Rigid { slave, .. } => slave,
-        }
-    }
-
-    /// Every surface that takes part.
+    /// Every surface that takes part: both, or the slave of an obstacle.
     pub fn surfaces(&self) -> impl Iterator<Item = &SurfaceName> {
-        let master = if let Self::Surfaces { master, .. } = self { Some(master) } else { None };
-        [self.slave()].into_iter().chain(master)
+        let (first, second) = match &self.sides {
+            Sides::Named { slave, master } => (slave, Some(master)),
+            Sides::Either([one, other]) => (one, Some(other)),
+            Sides::Rigid { slave, .. } => (slave, None),
+        };
+        [first].into_iter().chain(second)
     }
 
     /// The same, to be settled.
     pub(super) fn surfaces_mut(&mut self) -> impl Iterator<Item = &mut SurfaceName> {
-        let (slave, master) = match self {
-            Self::Surfaces { slave, master } => (slave, Some(master)),
-            Self::Rigid { slave, .. } => (slave, None),
+        let (first, second) = match &mut self.sides {
+            Sides::Named { slave, master } => (slave, Some(master)),
+            Sides::Either([one, other]) => (one, Some(other)),
+            Sides::Rigid { slave, .. } => (slave, None),
         };
-        [slave].into_iter().chain(master)
+        [first].into_iter().chain(second)
     }
 }
 
@@ -151,11 +163,15 @@ fn positive(key: &str, length: f64) -> Checked {
 }
 
 /// The section as written.
-#[derive(Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Section {
-    slave: SurfaceName,
+    slave: Option<SurfaceName>,
     master: Option<SurfaceName>,
+    surfaces: Option<[SurfaceName; 2]>,
+    #[serde(default)]
+    gap: f64,
+    clearance: Option<f64>,
     rigid: Option<Obstacle>,
 }
 
@@ -166,17 +182,37 @@ enum SectionError {
     OneSided,
     #[error("a contact has one second side: remove either master or rigid; other contacts may name the same slave")]
     ThreeSided,
+    #[error("surfaces names both sides of a contact: remove slave, master and rigid, or name the sides by these alone")]
+    NamedTwice,
+    #[error("a contact needs a slave (a surface) with a master or a rigid obstacle, or two surfaces")]
+    NoSlave,
 }
 
 impl TryFrom<Section> for Contact {
     type Error = SectionError;
 
-    fn try_from(Section { slave, master, rigid }: Section) -> Result<Self, SectionError> {
-        match (master, rigid) {
-            (Some(master), None) => Ok(Self::Surfaces { slave, master }),
-            (None, Some(rigid)) => Ok(Self::Rigid { slave, rigid }),
-            (None, None) => Err(SectionError::OneSided),
-            (Some(_), Some(_)) => Err(SectionError::ThreeSided),
+    fn try_from(section: Section) -> Result<Self, SectionError> {
+        let Section { slave, master, surfaces, gap, clearance, rigid } = section;
+        let sides = match (surfaces, slave, master, rigid) {
+            (Some(surfaces), None, None, None) => Sides::Either(surfaces),
+            (Some(_), ..) => return Err(SectionError::NamedTwice),
+            (None, None, ..) => return Err(SectionError::NoSlave),
+            (None, Some(slave), Some(master), None) => Sides::Named { slave, master },
+            (None, Some(slave), None, Some(obstacle)) => Sides::Rigid { slave, obstacle },
+            (None, Some(_), None, None) => return Err(SectionError::OneSided),
+            (None, Some(_), Some(_), Some(_)) => return Err(SectionError::ThreeSided),
+        };
+        Ok(Self { sides, gap, clearance })
+    }
+}
+
+impl From<Contact> for Section {
+    fn from(Contact { sides, gap, clearance }: Contact) -> Self {
+        let empty = Self { slave: None, master: None, surfaces: None, gap, clearance, rigid: None };
+        match sides {
+            Sides::Named { slave, master } => Self { slave: Some(slave), master: Some(master), ..empty },
+            Sides::Either(surfaces) => Self { surfaces: Some(surfaces), ..empty },
+            Sides::Rigid { slave, obstacle } => Self { slave: Some(slave), rigid: Some(obstacle), ..empty },
         }
     }
 }

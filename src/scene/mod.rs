@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 pub use body::{Axis, Body, Brick, Element, Gmsh, Rotation, Shape};
-pub use contact::{Contact, Obstacle};
+pub use contact::{Contact, Obstacle, Sides};
 pub use decomposition::{Decomposition, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use held::Held;

@@ -78,7 +78,7 @@ fn two_blocks_is_the_benchmark() {
     assert_eq!(scene.body.values().map(|body| body.brick().unwrap().cell_count()).sum::<usize>(), 6000);
     assert_eq!(scene.material["upper"], scene.material["lower"]);
     assert_eq!(traction(&scene, "top"), [0.0, 0.0, -150.0]);
-    assert_eq!(scene.contact["joint"].slave().to_string(), "upper.zmin");
+    assert_eq!(scene.contact["joint"].surfaces().next().unwrap().to_string(), "upper.zmin");
     assert_eq!(scene.decomposition, Decomposition::Bricks { cells: PAPER_CELLS });
     assert_eq!(scene.solver, Solver::default());
 }
@@ -315,7 +315,29 @@ fn loads_of_every_kind_read_back() {
 fn contact_pairs_are_checked() {
     assert_says(two_blocks(&["contact.joint.slave=middle.zmin"]), &["contact.joint.slave", "known are lower, upper"]);
     assert_says(two_blocks(&["contact.joint.master=middle.zmin"]), &["contact.joint.master"]);
-    assert_says(two_blocks(&["contact.joint.master=upper.zmax"]), &["contact.joint.master", "different bodies"]);
+    assert_says(two_blocks(&["contact.joint.master=upper.zmax"]), &["contact.joint.master", "does not touch itself"]);
+    assert_says(two_blocks(&["contact.joint.gap=nan"]), &["contact.joint.gap", "finite"]);
+    assert_says(two_blocks(&["contact.joint.clearance=inf"]), &["contact.joint.clearance", "finite"]);
+    assert_says(
+        two_blocks(&["contact.joint.clearance=0", "contact.joint.gap=1"]),
+        &["contact.joint.clearance", "remove gap"],
+    );
+    let again = "contact.more={surfaces = ['lower.zmax', 'upper.zmin']}";
+    assert_says(two_blocks(&[again]), &["contact.more.surfaces", "contact.joint is between the same two"]);
+}
+
+#[test]
+fn a_contact_may_leave_open_which_surface_is_the_slave() {
+    let either = |with: &str| two_blocks(&[&format!("contact.more={{{with}}}")]);
+    let scene = either("surfaces = ['lower.xmax', 'upper.xmin'], gap = -0.5").unwrap();
+    let Contact { sides, gap, .. } = &scene.contact["more"];
+    let names = |text: &str| text.parse::<SurfaceName>().unwrap();
+    assert_eq!((sides, *gap), (&Sides::Either(["lower.xmax", "upper.xmin"].map(names)), -0.5));
+    assert_says(either("surfaces = ['lower.xmax', 'lower.xmin']"), &["contact.more.surfaces", "does not touch itself"]);
+    assert_says(either("surfaces = ['lower.xmax', 'middle.xmin']"), &["contact.more.surfaces", "no body `middle`"]);
+    assert_says(either("surfaces = ['lower.xmax']"), &["contact.more"]);
+    assert_says(either("surfaces = ['lower.xmax', 'upper.xmin'], slave = 'upper.zmin'"), &["remove slave"]);
+    assert_says(either("master = 'lower.xmax'"), &["needs a slave", "two surfaces"]);
 }
 
 #[test]
@@ -328,7 +350,9 @@ fn a_contact_has_one_second_side() {
     assert_says(rigid("rigid = {cone = {point = [0, 0, 0]}}"), &["cone", "plane", "sphere", "cylinder", "heightfield"]);
     assert_says(rigid("rigid = {sphere = {centre = [0, 0, 0], diameter = 1}}"), &["diameter", "radius"]);
     assert_says(rigid("rigid = {sphere = {centre = [0, 0, 0]}}"), &["missing key", "radius"]);
-    let text = rigid("rigid = {cylinder = {point = [0, 0, 0], axis = [1, 0, 0], radius = 2, inside = true}}").unwrap();
+    let text =
+        rigid("gap = 0.25, rigid = {cylinder = {point = [0, 0, 0], axis = [1, 0, 0], radius = 2, inside = true}}")
+            .unwrap();
     assert_eq!(Scene::from_text(&text.to_toml(), "echo", 1, &[]).unwrap(), text);
 }
 

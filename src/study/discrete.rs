@@ -2,16 +2,17 @@
 
 use super::StudyError;
 use super::conditions::{self, RightHandSides};
+use super::contacts;
 use crate::assembly::loads::Load;
 use crate::bodies::Meshes;
 use crate::comm::Comm;
-use crate::constraint::{Constraints, Support, dirichlet};
-use crate::contact::surface::GatheredSurface;
-use crate::contact::{ContactError, ContactPair, corner, matching, mortar, rigid};
+use crate::constraint::{Constraints, Support};
+use crate::contact::ContactPair;
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
 use crate::material::Material;
 use crate::mesh::Face;
 use crate::monitor::timing::peak_rss_mb;
+use crate::results::summary::ContactRow;
 use crate::scene::{self, Scene, SurfaceName};
 
 /// One rank's part of the discrete problem.
@@ -26,6 +27,8 @@ pub struct Discrete {
     pub decomposition: Decomposition,
     /// Names of the contacts.
     pub contacts: Vec<String>,
+    /// How they were paired.
+    pub contact_rows: Vec<ContactRow>,
     /// All contact pairs of the scene.
     pub pairs: Vec<ContactPair>,
     /// Supports, in the order of their names.
@@ -90,23 +93,7 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
             displacement: s.displacement.unwrap_or_default(),
         })
         .collect();
-    let held = |nodes: &[u64]| dirichlet::held(comm, &decomposition.interface, &supports, nodes);
-    let mut pairs = Vec::new();
-    for (number, (name, contact)) in scene.contact.iter().enumerate() {
-        let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
-        let slave = gather(contact.slave());
-        pairs.extend(match contact {
-            scene::Contact::Surfaces { master, .. } => {
-                let master = gather(master);
-                match matching::pair(number, &slave, &master) {
-                    Some(pairs) if pairs.is_empty() => return Err(ContactError::Apart { name: name.clone() }.into()),
-                    Some(pairs) => pairs,
-                    None => mortar::pair(number, name, &slave, &master, &held(&slave.nodes))?,
-                }
-            }
-            scene::Contact::Rigid { rigid: obstacle, .. } => rigid::pair(number, name, &slave, obstacle)?,
-        });
-    }
+    let (pairs, contact_rows) = contacts::pair(scene, comm, &decomposition, &supports, index)?;
     let load = |load: &scene::Load| match load {
         scene::Load::Traction { surface, traction } => Load::Traction { surface: index(surface), value: *traction },
         scene::Load::Pressure { surface, pressure } => Load::Pressure { surface: index(surface), value: *pressure },
@@ -114,7 +101,6 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     };
     let loads = scene.load.values().map(load).collect();
     let contacts: Vec<String> = scene.contact.keys().cloned().collect();
-    corner::check(&contacts, &pairs, held)?;
     let given =
         conditions::Given { decomposition: &decomposition, supports: &supports, contacts: &contacts, pairs: &pairs };
     let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given)?;
@@ -124,6 +110,7 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
         surfaces,
         decomposition,
         contacts,
+        contact_rows,
         pairs,
         supports,
         loads,

@@ -131,6 +131,7 @@ pub(super) fn summarise(
     };
     Summary {
         title: scene.title.clone(),
+        contacts: discrete.contact_rows.clone(),
         converged: Some(failure.is_none()),
         plastic_fraction: Some(solution.plastic_elements as f64 / sizes.elements as f64),
         newton_iterations: Some(steps.len() as u64),

@@ -4,7 +4,7 @@ use super::*;
 
 /// A surface over a grid: corners of `n` x `m` cells, each two triangles; `at` maps the unit square. Counter-clockwise in
 /// the square, seen from outside, unless `turned`.
-fn grid([n, m]: [usize; 2], first: u64, turned: bool, at: impl Fn(f64, f64) -> [f64; 3]) -> GatheredSurface {
+pub fn grid([n, m]: [usize; 2], first: u64, turned: bool, at: impl Fn(f64, f64) -> [f64; 3]) -> GatheredSurface {
     let node = |i: usize, j: usize| i + (n + 1) * j;
     let mut triangles = Vec::new();
     for (i, j) in (0..n * m).map(|k| (k % n, k / n)) {
