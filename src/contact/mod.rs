@@ -36,8 +36,9 @@ pub struct ContactPair {
     /// Initial distance along the normal (length), times the sum of the slave side's weights; negative where the bodies
     /// overlap.
     pub gap: f64,
-    /// Share of the slave surface that belongs to the node: pressure is force on the condition over this area. A third of the
-    /// adjacent triangles; of their part that faces the master surface where meshes do not match.
+    /// Share of the slave surface that belongs to the node, seen along its outward normal: pressure is force on the condition
+    /// over this area. A third of the adjacent triangles; of their part that faces the master surface where meshes do not
+    /// match.
     pub area: f64,
 }
 

@@ -43,6 +43,8 @@ type Points = Vec<(f64, [f64; 3], [usize; 3], [f64; 3])>;
 #[derive(Default)]
 struct Sums {
     own: f64,
+    /// As `own`, each triangle's part seen along the node's normal.
+    area: f64,
     slaves: BTreeMap<usize, f64>,
     masters: BTreeMap<usize, f64>,
 }
@@ -67,7 +69,9 @@ pub fn pair(
     for (triangle, corners) in slave.triangles.iter().zip(slave.corners()) {
         let points = opposite.points(&corners);
         faces |= !points.is_empty();
-        add(&mut sums, triangle, triangle.map(|node| active[node]), &points);
+        let Some(along) = surface::normal(&corners) else { continue };
+        let cosines = triangle.map(|node| dot(normals[node].0, along));
+        add(&mut sums, triangle, triangle.map(|node| active[node]), cosines, &points);
     }
     sums.retain(|&node, sums| sums.own > COVERED * normals[node].1);
     if sums.is_empty() {
@@ -89,7 +93,7 @@ pub fn pair(
             masters: weights(&sums.masters, master),
             normal,
             gap,
-            area: sums.own,
+            area: sums.area,
         }
     };
     Ok(sums.into_iter().map(condition).collect())
@@ -101,8 +105,8 @@ fn is_held(normal: [f64; 3], held: [bool; 3]) -> bool {
     left < 1e-16
 }
 
-/// Adds what one triangle gives to the sums of its active corners.
-fn add(sums: &mut BTreeMap<usize, Sums>, triangle: &[usize; 3], active: [bool; 3], points: &Points) {
+/// Adds what one triangle gives to the sums of its active corners; `cosines` are those between its normal and the nodes'.
+fn add(sums: &mut BTreeMap<usize, Sums>, triangle: &[usize; 3], active: [bool; 3], cosines: [f64; 3], points: &Points) {
     if points.is_empty() || !active.contains(&true) {
         return;
     }
@@ -116,6 +120,7 @@ fn add(sums: &mut BTreeMap<usize, Sums>, triangle: &[usize; 3], active: [bool; 3
     for j in (0..3).filter(|&j| active[j]) {
         let of_node = sums.entry(triangle[j]).or_default();
         of_node.own += found.slave[j][j];
+        of_node.area += cosines[j] * found.slave[j][j];
         for k in (0..3).filter(|&k| !active[k]) {
             *of_node.slaves.entry(triangle[k]).or_default() += found.slave[j][k];
         }

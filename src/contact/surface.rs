@@ -61,21 +61,20 @@ impl GatheredSurface {
         dot(diagonal, diagonal).sqrt()
     }
 
-    /// Unit normal and share of the area (a third of the adjacent triangles) of each node.
+    /// Unit normal of each node, and its share of the area: a third of the adjacent triangles, seen along the normal. A
+    /// pressure times that area along that normal is what the pressure on the triangles does to the node.
     pub fn normals_and_areas(&self) -> Vec<([f64; 3], f64)> {
-        let mut sums = vec![([0.0; 3], 0.0); self.nodes.len()];
+        let mut sums = vec![[0.0; 3]; self.nodes.len()];
         for (triangle, vector) in self.triangles.iter().zip(self.area_vectors()) {
             for &corner in triangle {
-                let (normal, area) = &mut sums[corner];
-                (0..3).for_each(|a| normal[a] += vector[a]);
-                *area += dot(vector, vector).sqrt() / 3.0;
+                (0..3).for_each(|a| sums[corner][a] += vector[a] / 3.0);
             }
         }
-        for (normal, _) in &mut sums {
-            let length = dot(*normal, *normal).sqrt();
-            *normal = normal.map(|n| n / length);
-        }
-        sums
+        let parts = |sum: [f64; 3]| {
+            let area = dot(sum, sum).sqrt();
+            (sum.map(|s| s / area), area)
+        };
+        sums.into_iter().map(parts).collect()
     }
 
     /// Typical edge length: root of twice the mean triangle area.
@@ -141,7 +140,8 @@ mod tests {
         let length = 5.0_f64.sqrt();
         let expected = [-1.0 / length, 0.0, 2.0 / length];
         assert!((0..3).all(|a| (ridge[a].abs() - expected[a].abs()).abs() < 1e-15));
-        assert!((area - 0.5).abs() < 1e-15 && (third - 1.0 / 3.0).abs() < 1e-15);
+        // Triangles of areas 1 and 1/2, at right angles.
+        assert!((area - 1.25_f64.sqrt() / 3.0).abs() < 1e-15 && (third - 1.0 / 3.0).abs() < 1e-15);
         assert_eq!(slope, [0.0, 0.0, 1.0]);
     }
 }
