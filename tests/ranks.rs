@@ -126,3 +126,11 @@ fn contact_of_meshes_that_do_not_match_gives_the_same_bits_on_1_2_3_and_5_ranks(
     let cells = ["body.upper.brick.cells=[6, 5, 4]", "decomposition.cells=[2, 1, 2]"];
     assert_independent_of_ranks("patch", &cells, &[1, 2, 3, 5]);
 }
+
+#[test]
+fn curved_interfaces_of_a_mesh_file_give_the_same_bits_on_1_2_and_3_ranks() {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/ring.toml");
+    let mesh = ["inner", "outer"].map(|body| format!("body.{body}.gmsh.file='../tests/meshes/ring-8-6.msh'"));
+    let sets = [&mesh[0], &mesh[1], "decomposition.subdomains=24"];
+    assert!(assert_independent_of_ranks(scene, &sets, &[1, 2, 3]) >= 24);
+}
