@@ -1,0 +1,309 @@
+#!/usr/bin/env python3
+"""Errors of contact between curved surfaces against closed forms, on refined meshes.
+
+    scripts/accuracy.py run [STUDY ...] [--np 2]    makes meshes, solves, appends to bench-results/accuracy.jsonl
+    scripts/accuracy.py write                       makes bench-results/accuracy.md of it
+
+Studies are ring, patch and hertz; all of them take five minutes.
+
+Needs the packages of scripts/requirements.txt and a release build.
+"""
+
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import h5py
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+RECORDS = ROOT / "bench-results/accuracy.jsonl"
+TABLE = ROOT / "bench-results/accuracy.md"
+
+
+class Fields:
+    """Points and elements of a result, pieces one behind the other; fields of the last state."""
+
+    def __init__(self, path):
+        with h5py.File(path) as file:
+            grid = file["VTKHDF"]
+            points, entries = (grid[f"NumberOf{name}"][:] for name in ("Points", "ConnectivityIds"))
+            self.points = grid["Points"][:]
+            connectivity = grid["Connectivity"][:] + np.repeat(np.cumsum(points) - points, entries)
+            self.tets = connectivity.reshape(-1, 4)
+            self.of_points = {name: data[-len(self.points) :] for name, data in grid["PointData"].items()}
+            self.of_cells = {name: data[-len(self.tets) :] for name, data in grid["CellData"].items()}
+
+    def centres(self):
+        return self.points[self.tets].mean(axis=1)
+
+    def volumes(self):
+        corners = self.points[self.tets]
+        return np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+
+    def body_of_points(self):
+        body = np.zeros(len(self.points), dtype=int)
+        body[self.tets] = self.of_cells["body"][:, None]
+        return body
+
+
+def bisect(low, high, above):
+    """Where `above` begins to hold."""
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if above(middle) else (middle, high)
+    return 0.5 * (low + high)
+
+
+def solve(scene, sets, ranks, directory):
+    """Summary and fields of a run."""
+    command = ["mpirun", "-np", str(ranks), str(ROOT / "target/release/fetiplast"), "solve", str(scene)]
+    command += ["--out", str(directory), "--progress", "off"]
+    for key in sets:
+        command += ["--set", key]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return json.loads((directory / f"{scene.stem}.json").read_text()), Fields(directory / f"{scene.stem}.vtkhdf")
+
+
+def mesh(name, arguments, out):
+    command = [sys.executable, str(ROOT / f"scripts/meshes/{name}.py"), "--out", str(out)]
+    subprocess.run(command + [str(a) for a in arguments], check=True)
+
+
+# Nested spheres: radii, pressure, clearance, and the material of src/scene; formulas as in src/analytic.
+A, B, D, PRESSURE, GAP = 100.0, 200.0, 300.0, 600.0, 0.05
+YOUNG, POISSON, YIELD, HARDENING = 210000.0, 0.29, 450.0, 10000.0
+
+
+def nested_spheres():
+    """Contact pressure, plastic front, displacement of the outer sphere at the interface."""
+    h = 2 * (1 - POISSON) * HARDENING / YOUNG
+    h /= 1 + h
+
+    def pressure_of(c):
+        shell = (1 - h) * np.log(c / A) + h / 3 * (c**3 / A**3 - 1)
+        return 2 * YIELD * shell + 2 * YIELD / 3 * (1 - c**3 / B**3)
+
+    def outer(q):
+        shape = (1 - 2 * POISSON) + (1 + POISSON) * D**3 / (2 * B**3)
+        return q * B**4 / (YOUNG * (D**3 - B**3)) * shape
+
+    def front(q):
+        return bisect(A, B, lambda c: pressure_of(c) > PRESSURE - q)
+
+    def open_gap(q):
+        inner = (1 - POISSON) * YIELD * front(q) ** 3 / (YOUNG * B**2) - (1 - 2 * POISSON) * q * B / YOUNG
+        return inner - outer(q) < GAP
+
+    q = bisect(0.0, PRESSURE, open_gap)
+    return q, front(q), outer(q)
+
+
+def ring_errors(summary, fields):
+    q, front, displacement = nested_spheres()
+    radius = np.linalg.norm(fields.points, axis=1)
+    outward = fields.points / radius[:, None]
+    radial = (fields.of_points["displacement"] * outward).sum(axis=1)
+    slaves = fields.of_points["contact_status"] >= 0
+    pressure = fields.of_points["contact_pressure"][slaves]
+    force = np.abs(summary["contact_force"]).mean() / (0.25 * np.pi * B**2)
+    body = fields.body_of_points()
+    at_interface = (body == 1) & (np.abs(radius - B) < 1e-6 * B)
+    kappa, volumes = fields.of_cells["equivalent_plastic_strain"], fields.volumes()
+    r = np.linalg.norm(fields.centres(), axis=1)
+    slope = 2 * (1 - POISSON) * HARDENING / YOUNG
+    exact = 2 * (1 - POISSON) * YIELD / YOUNG * np.maximum(front**3 / r**3 - 1, 0) / (1 + slope)
+    exact[fields.of_cells["body"] == 1] = 0.0
+    inner = volumes[fields.of_cells["body"] == 0].sum()
+    yielded = (B**3 - A**3) * volumes[kappa > 0].sum() / inner
+    return {
+        "contact force": abs(force / q - 1),
+        "contact pressure": np.sqrt(np.mean((pressure / q - 1) ** 2)),
+        "plastic front": abs((A**3 + yielded) ** (1 / 3) / front - 1),
+        "plastic strain": np.sqrt((volumes * (kappa - exact) ** 2).sum() / (volumes * exact**2).sum()),
+        "displacement": np.sqrt(np.mean((radial[at_interface] / displacement - 1) ** 2)),
+    }
+
+
+FACETS = ["contact.joint={surfaces=['inner.interface', 'outer.interface'], gap=0.05}"]
+"""Without a clearance: the gap is added to what lies between the facets of both surfaces."""
+
+
+def ring(ranks):
+    families = {
+        "matching": ([(8, 8), (16, 16), (32, 32)], ["contact.joint.clearance=0.05"]),
+        "inner finer": ([(8, 6), (16, 12), (32, 24)], ["contact.joint.clearance=0.05"]),
+        "outer finer": ([(8, 11), (16, 22), (32, 44)], ["contact.joint.clearance=0.05"]),
+        "distance of the facets": ([(8, 6), (16, 12), (32, 24)], FACETS),
+    }
+    scene = (ROOT / "scenes/ring.toml").read_text()
+    for family, (sizes, sets) in families.items():
+        for inner, outer in sizes:
+            with tempfile.TemporaryDirectory() as directory:
+                directory = pathlib.Path(directory)
+                (directory / "ring.toml").write_text(scene)
+                mesh("ring", ["--inner", inner, "--outer", outer], directory / "ring.msh")
+                summary, fields = solve(directory / "ring.toml", sets, ranks, directory)
+            width = 0.5 * np.pi * B / inner
+            yield {"family": family, "h": width, "mesh": f"{inner}/{outer}"}, summary, ring_errors(summary, fields)
+
+
+def patch(ranks):
+    """Pressure in and around two elastic spheres: each is under that pressure alone, and displacements are linear."""
+    sets = ["material.paper.yield_stress=1e9", "contact.joint.clearance=0", "load.bore.pressure=100"]
+    sets += ["load.outside={surface='outer.outside', pressure=100}", "solver.residual_tolerance=1e-10"]
+    sets += ["solver.newton_tolerance=1e-9", "solver.qp_tolerance=1e-11"]
+    families = {
+        "matching": [(8, 8)],
+        "3 : 2": [(6, 4), (12, 8), (24, 16)],
+        "4 : 3": [(8, 6), (16, 12), (32, 24)],
+    }
+    for family, sizes in families.items():
+        for inner, outer in sizes:
+            with tempfile.TemporaryDirectory() as directory:
+                directory = pathlib.Path(directory)
+                (directory / "ring.toml").write_text((ROOT / "scenes/ring.toml").read_text())
+                mesh("ring", ["--inner", inner, "--outer", outer], directory / "ring.msh")
+                summary, fields = solve(directory / "ring.toml", sets, ranks, directory)
+            pressure = fields.of_points["contact_pressure"][fields.of_points["contact_status"] >= 0] / 100 - 1
+            stress, volumes = fields.of_cells["von_mises"] / 100, fields.volumes()
+            errors = {
+                "contact pressure": np.sqrt(np.mean(pressure**2)),
+                "worst contact pressure": np.abs(pressure).max(),
+                "von Mises stress": np.sqrt((volumes * stress**2).sum() / volumes.sum()),
+                "worst von Mises stress": stress.max(),
+            }
+            yield {"family": family, "h": 0.5 * np.pi * B / inner, "mesh": f"{inner}/{outer}"}, summary, errors
+
+
+# Hertz: two bodies of one material, a ball and a block.
+RADIUS, APPROACH, HERTZ_POISSON = 100.0, 0.01, 0.3
+
+
+def nodal_areas(fields, nodes):
+    """Areas of those triangles of the boundary whose corners are all among some nodes, a third to each corner."""
+    faces = fields.tets[:, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    faces = faces[first[count == 1]]
+    faces = faces[nodes[faces].all(axis=1)]
+    corners = fields.points[faces]
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    found = np.zeros(len(fields.points))
+    np.add.at(found, faces, areas[:, None] / 3)
+    return found
+
+
+def hertz_errors(summary, fields):
+    """Against Hertz for the force that was found: contact radius, peak pressure, approach."""
+    modulus = YOUNG / (2 * (1 - HERTZ_POISSON**2))
+    force = 4 * abs(summary["contact_force"][2])
+    radius = (0.75 * force * RADIUS / modulus) ** (1 / 3)
+    slaves = fields.of_points["contact_status"] >= 0
+    areas = nodal_areas(fields, slaves)
+    pressure = fields.of_points["contact_pressure"][slaves]
+    closed = fields.of_points["contact_status"] == 1
+    r = np.linalg.norm(fields.points[slaves][:, :2], axis=1)
+    load = pressure * areas[slaves]
+    peak = 1.5 * force / (np.pi * radius**2)
+    profile = peak * np.sqrt(np.maximum(1 - (r / radius) ** 2, 0))
+    weights = areas[slaves]
+    return {
+        "contact radius": np.sqrt(4 * areas[closed].sum() / np.pi) / radius - 1,
+        "radius of inertia": np.sqrt(2.5 * (load * r**2).sum() / load.sum()) / radius - 1,
+        "pressure on the axis": pressure[r.argmin()] / peak - 1,
+        "largest nodal pressure": pressure.max() / peak - 1,
+        "pressure": np.sqrt((weights * (pressure - profile) ** 2).sum() / (weights * profile**2).sum()),
+        "approach": APPROACH / (radius**2 / RADIUS) - 1,
+    }
+
+
+def hertz(ranks):
+    for h in (0.2, 0.1, 0.05):
+        with tempfile.TemporaryDirectory() as directory:
+            directory = pathlib.Path(directory)
+            (directory / "hertz.toml").write_text((ROOT / "scenes/hertz.toml").read_text())
+            mesh("hertz", ["--h", h], directory / "hertz.msh")
+            summary, fields = solve(directory / "hertz.toml", [], ranks, directory)
+        yield {"family": "hertz", "h": h, "mesh": f"a/{1 / h:.0f}"}, summary, hertz_errors(summary, fields)
+
+
+STUDIES = {"ring": ring, "patch": patch, "hertz": hertz}
+
+
+def run(arguments):
+    for study in arguments.studies or STUDIES:
+        for place, summary, errors in STUDIES[study](arguments.np):
+            record = {"study": study, **place, "nodes": summary["nodes"], "elements": summary["elements"]}
+            record |= {"slave": summary["contacts"][0]["slave"], "rule": summary["contacts"][0]["rule"]}
+            record |= {"seconds": summary["time_total"], "ranks": summary["ranks"]}
+            record["errors"] = {name: float(error) for name, error in errors.items()}
+            print(json.dumps(record), flush=True)
+            with RECORDS.open("a") as file:
+                file.write(json.dumps(record) + "\n")
+
+
+NOTES = {
+    "ring": """Nested spheres (scene `ring`, pressure 600, clearance 0.05), one octant; N/M are the triangles along an edge of the
+inner and the outer sphere. *Contact force*: mean over the surface; *contact pressure*: root mean square over the slave nodes;
+*plastic front*: radius of a sphere that holds as much yielded volume; *plastic strain*: in the L2 norm; *displacement* of the
+outer sphere at the interface: root mean square. The last family takes the distance of the meshes instead of a clearance: the
+facets' own gaps and overlaps are as large as the displacements, and vanish with the square of the width only.""",
+    "patch": """Patch test on a curved surface: the same spheres, elastic, without a gap, a pressure in and around them. Each is under
+that pressure alone, with linear displacements, which linear elements hold exactly; all errors are those of the contact.
+Relative to the pressure.""",
+    "hertz": """Hertz (scene `hertz`), against the closed form for the force that was found. *Contact radius*: of a circle as large as the
+closed nodes' share of the surface; *radius of inertia*: from the second moment of the pressure; *pressure*: in the L2 norm;
+*approach*: what was prescribed. A ball of 100 contact radii leaves about -0.7 % of the approach, whatever the mesh.""",
+}
+
+
+def write(_):
+    """The last record of each study, family and mesh, with orders between the rows of a family."""
+    records = {}
+    for line in RECORDS.read_text().splitlines():
+        record = json.loads(line)
+        records[record["study"], record["family"], record["mesh"]] = record
+    text = "# Contact of curved surfaces, measured\n\nWritten by `scripts/accuracy.py write` from "
+    text += "[accuracy.jsonl](accuracy.jsonl), which `scripts/accuracy.py run` measured.\n"
+    text += "Relative errors; in brackets the order between a row and the one above.\n"
+    for study, note in NOTES.items():
+        rows = [record for record in records.values() if record["study"] == study]
+        if not rows:
+            continue
+        names = list(rows[0]["errors"])
+        text += f"\n## {study}\n\n{note}\n\n| | mesh | h | elements | s | " + " | ".join(names) + " |\n"
+        text += "| --- | --- |" + " ---: |" * (3 + len(names)) + "\n"
+        above = None
+        for row in rows:
+            same = above is not None and above["family"] == row["family"]
+            cells = ["" if same else row["family"], row["mesh"], f"{row['h']:.3g}", f"{row['elements']}"]
+            cells.append(f"{row['seconds']:.1f}")
+            for name in names:
+                error = row["errors"][name]
+                cell = f"{error:.2e}"
+                if same and 1e-8 < min(abs(error), abs(above["errors"][name])):
+                    ratio = np.log(abs(above["errors"][name] / error)) / np.log(above["h"] / row["h"])
+                    cell += f" ({ratio:.1f})"
+                cells.append(cell)
+            text += "| " + " | ".join(cells) + " |\n"
+            above = row
+    TABLE.write_text(text)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(required=True)
+    running = commands.add_parser("run")
+    running.add_argument("studies", nargs="*", metavar="STUDY", help=", ".join(STUDIES))
+    running.add_argument("--np", type=int, default=2)
+    running.set_defaults(act=run)
+    commands.add_parser("write").set_defaults(act=write)
+    arguments = parser.parse_args()
+    arguments.act(arguments)
+
+
+if __name__ == "__main__":
+    main()
