@@ -181,8 +181,9 @@ def surface_actor(data, field, limits, colours):
     return actor
 
 
-def render(actors):
-    """The actors seen from the front, the right and above, as an array of pixels cropped to what is drawn."""
+def render(actors, close=None):
+    """The actors seen from the front, the right and above, as an array of pixels cropped to what is drawn; or, `close` to a
+    point, what is within a distance of it."""
     renderer = vtkRenderer()
     renderer.SetBackground(1, 1, 1)
     for actor in actors:
@@ -198,6 +199,11 @@ def render(actors):
     camera.SetViewUp(0, 0, 1)
     camera.SetViewAngle(20)
     renderer.ResetCamera()
+    if close is not None:
+        (x, y, z), distance = close
+        renderer.ResetCamera(x - distance, x + distance, y - distance, y + distance, z - distance, z + distance)
+        renderer.ResetCameraClippingRange()
+        window.SetSize(PIXELS[1], PIXELS[1])
     window.Render()
     capture = vtkWindowToImageFilter()
     capture.SetInput(window)
