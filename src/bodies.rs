@@ -9,10 +9,11 @@ use thiserror::Error;
 
 use crate::comm::Comm;
 use crate::decomposition::{BodyMesh, Counts, Shape, number_bodies};
+use crate::element::Kind;
 use crate::mesh::gmsh::{Msh, Problem};
 use crate::mesh::placement::Placement;
 use crate::mesh::quality::Quality;
-use crate::mesh::{Brick, TetMesh};
+use crate::mesh::{Brick, SolidMesh};
 use crate::results::agree::root_texts;
 use crate::scene::{self, Axis, Decomposition, Gmsh, Held, Scene};
 
@@ -33,7 +34,7 @@ pub struct Meshes {
     /// In the order of the bodies' names.
     pub bodies: Vec<BodyMesh>,
     /// On rank 0 the meshes from files, by body; empty elsewhere.
-    pub tets: BTreeMap<usize, TetMesh>,
+    pub solids: BTreeMap<usize, SolidMesh>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -55,25 +56,32 @@ impl Meshes {
             "unreadable" => return Err(MeshError::Unreadable(texts[1].clone())),
             _ => {}
         }
-        let tets = found?.tets;
-        let mine = tets.values().flat_map(|m| [m.points.len() as u64, m.cells, m.tets.len() as u64]).collect();
+        let solids = found?.solids;
+        let mine = solids.values().flat_map(|m| [m.points.len() as u64, m.cells, m.elements.len() as u64]).collect();
         let outgoing = if comm.rank() == 0 { vec![mine; comm.size()] } else { vec![Vec::new(); comm.size()] };
         let mut counts = comm.all_to_all(outgoing).swap_remove(0).into_iter();
-        let shape = |body: &scene::Body| match &body.shape {
+        let mut shape = |body: &scene::Body| match &body.shape {
             scene::Shape::Brick(b) => brick(b),
             scene::Shape::Gmsh(_) => {
                 let [nodes, cells, elements] = [(); 3].map(|()| counts.next().expect("every mesh is counted"));
-                Shape::Tets(Counts { nodes, cells, elements })
+                Shape::Mesh(Counts { nodes, cells, elements })
             }
         };
-        let bodies = number_bodies(scene.body.values().map(shape).collect());
-        Ok(Self { bodies, tets, warnings: texts[2..].to_vec() })
+        let bodies = number_bodies(scene.body.values().map(|body| (kind(body.element), shape(body))));
+        Ok(Self { bodies, solids, warnings: texts[2..].to_vec() })
     }
 }
 
 /// The bodies of a scene of bricks alone.
 pub fn bricks(scene: &Scene) -> Option<Vec<BodyMesh>> {
-    scene.body.values().map(|body| body.brick().map(brick)).collect::<Option<_>>().map(number_bodies)
+    let shapes = scene.body.values().map(|body| Some((kind(body.element), brick(body.brick()?))));
+    shapes.collect::<Option<Vec<_>>>().map(number_bodies)
+}
+
+fn kind(element: scene::Element) -> Kind {
+    match element {
+        scene::Element::Tet4 => Kind::Tet4,
+    }
 }
 
 fn brick(b: &scene::Brick) -> Shape {
@@ -83,7 +91,7 @@ fn brick(b: &scene::Brick) -> Shape {
 /// What rank 0 reads.
 #[derive(Default)]
 struct Found {
-    tets: BTreeMap<usize, TetMesh>,
+    solids: BTreeMap<usize, SolidMesh>,
     warnings: Vec<String>,
 }
 
@@ -113,7 +121,7 @@ fn read(scene: &Scene) -> Result<Found, MeshError> {
             let mut mesh = msh.volume(gmsh.volume.as_deref(), &surfaces).map_err(problem)?;
             place(gmsh, &mut mesh);
             found.warnings.extend(check(scene, name, &mesh)?);
-            found.tets.insert(*index, mesh);
+            found.solids.insert(*index, mesh);
         }
         let used: BTreeSet<_> = bodies.iter().map(|b| b.gmsh.volume.clone()).collect();
         let unused: Vec<_> =
@@ -131,7 +139,7 @@ fn surfaces_of<'a>(scene: &'a Scene, body: &str) -> BTreeSet<&'a str> {
     scene.surfaces().filter(|surface| surface.body == body).map(|surface| &surface.surface[..]).collect()
 }
 
-fn place(gmsh: &Gmsh, mesh: &mut TetMesh) {
+fn place(gmsh: &Gmsh, mesh: &mut SolidMesh) {
     let rotation = gmsh.rotate.map(|r| (r.axis, r.angle_deg));
     Placement { scale: gmsh.scale, rotation, translation: gmsh.translate }.apply(&mut mesh.points);
 }
@@ -140,8 +148,8 @@ fn place(gmsh: &Gmsh, mesh: &mut TetMesh) {
 const POOR_SHAPE: f64 = 0.01;
 
 /// Looks at one body; returns warnings.
-fn check(scene: &Scene, body: &str, mesh: &TetMesh) -> Result<Vec<String>, MeshError> {
-    let quality = Quality::of(mesh.tets.iter().map(|&tet| mesh.corners(tet)));
+fn check(scene: &Scene, body: &str, mesh: &SolidMesh) -> Result<Vec<String>, MeshError> {
+    let quality = Quality::of(mesh);
     if !quality.is_sound() {
         // Sound in the file: the coordinates of the scene have lost its digits.
         let rule = "gmsh.scale and gmsh.translate leave elements without volume";
@@ -173,8 +181,10 @@ fn check(scene: &Scene, body: &str, mesh: &TetMesh) -> Result<Vec<String>, MeshE
 /// Refuses more subdomains than elements; of bricks alone the scene's own checks do.
 fn count(scene: &Scene, found: &Found) -> Result<(), MeshError> {
     let Decomposition::Metis { subdomains: Some(subdomains) } = scene.decomposition else { return Ok(()) };
-    let bricks = scene.body.values().filter_map(|b| Some(b.brick()?.cell_count() * b.element.per_cell()));
-    let elements = found.tets.values().map(|mesh| mesh.tets.len()).chain(bricks).fold(0_usize, usize::saturating_add);
+    let bricks =
+        scene.body.values().filter_map(|b| Some(b.brick()?.cell_count() * kind(b.element).per_cell() as usize));
+    let elements =
+        found.solids.values().map(|mesh| mesh.elements.len()).chain(bricks).fold(0_usize, usize::saturating_add);
     if subdomains <= elements {
         return Ok(());
     }

@@ -120,7 +120,8 @@ pub fn costs<'a>(
     for (subdomain, u) in subdomains.iter().zip(u) {
         let (body, brick) = (subdomain.body, brick(&bodies[subdomain.body]));
         for nodes in internal::yielding(subdomain, material(body), &[], u) {
-            let centre = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>() / 4.0;
+            let sum = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>();
+            let centre = |a: usize| sum(a) / nodes.len() as f64;
             let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);
             yielding.insert(numbers[body][boxes.around(body, place)] as u64);
         }

@@ -1,17 +1,19 @@
 //! `F(u) = D Psi(u)`: internal forces and energy of a subdomain, and energies in the elastic norm.
+//!
+//! Histories are those of the integration points, element by element.
 
-use super::{committed, displacements, geometry};
+use super::{committed, displacements, integrated};
 use crate::decomposition::Subdomain;
-use crate::element::tet4::Tet4;
-use crate::material::{History, Material, Response};
-use crate::tensor::{Voigt, apply, contract};
+use crate::element::{Nodal, Point, by_kind};
+use crate::material::{History, Material};
+use crate::tensor::{Voigt, apply, contract, von_mises};
 
 /// What one pass over the elements finds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Internal {
     /// `Psi(u)` (energy).
     pub energy: f64,
-    /// Elements that yield.
+    /// Elements that yield at one point at least.
     pub plastic: usize,
     /// What could cancel.
     pub terms: Terms,
@@ -21,24 +23,35 @@ pub struct Internal {
 /// cancel to round-off.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms {
-    /// Sum over the elements of `V (lambda + 2 mu) (sum_a |g_a| |u_a|)^2` (energy).
+    /// Sum over the points of `w (lambda + 2 mu) (sum_a |g_a| |u_a|)^2` (energy).
     pub energy: f64,
-    /// Sum over the elements and their nodes of `(V (lambda + 2 mu) |g_a| sum_b |g_b| |u_b|)^2` (force squared).
+    /// Sum over the elements and their nodes, of `P` times the sum over their `P` points of `(w (lambda + 2 mu) |g_a|
+    /// sum_b |g_b| |u_b|)^2` (force squared).
     pub force_squares: f64,
 }
 
 impl Terms {
-    fn add(&mut self, element: &Tet4, modulus: f64, u: &[f64; 12]) {
-        let steepness = element.gradients.map(|g| g.iter().map(|x| x * x).sum::<f64>());
-        let lengths = steepness
-            .iter()
-            .zip(u.as_chunks::<3>().0)
-            .map(|(s, u)| (s * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])).sqrt());
-        let strain: f64 = lengths.sum();
-        let stress = element.volume * modulus * strain;
-        self.energy += stress * strain;
-        self.force_squares += stress * stress * steepness.iter().sum::<f64>();
+    fn add<const N: usize, const P: usize>(&mut self, points: &[Point<N>; P], modulus: f64, u: &Nodal<N>) {
+        for point in points {
+            let steepness = point.gradients.map(|g| g.iter().map(|x| x * x).sum::<f64>());
+            let lengths = steepness.iter().zip(u).map(|(s, u)| (s * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])).sqrt());
+            let strain: f64 = lengths.sum();
+            let stress = point.weight * modulus * strain;
+            self.energy += stress * strain;
+            self.force_squares += P as f64 * (stress * stress * steepness.iter().sum::<f64>());
+        }
     }
+}
+
+/// What an element answers: means over its integration points by volume.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Answer {
+    /// Von Mises stress.
+    pub von_mises: f64,
+    /// Accumulated plastic strain at the end of the step.
+    pub kappa: f64,
+    /// Whether it yields at one point at least.
+    pub plastic: bool,
 }
 
 /// Adds the internal forces at `u`, one step from the committed `history`, to `forces`.
@@ -49,66 +62,121 @@ pub fn add_forces(
     u: &[f64],
     forces: &mut [f64],
 ) -> Internal {
+    by_kind!(subdomain.elements.kind(), add_forces_of(subdomain, material, history, u, forces))
+}
+
+fn add_forces_of<const N: usize, const P: usize>(
+    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
+    subdomain: &Subdomain,
+    material: &Material,
+    history: &[History],
+    u: &[f64],
+    forces: &mut [f64],
+) -> Internal {
     let modulus = material.lambda() + 2.0 * material.shear_modulus();
     let mut sum = Internal::default();
-    for (index, nodes) in subdomain.elements.iter().enumerate() {
-        let element = geometry(&subdomain.points, nodes);
+    for (index, (nodes, points)) in integrated(points, &subdomain.elements, &subdomain.points).enumerate() {
         let u = displacements(u, nodes);
-        sum.terms.add(&element, modulus, &u);
-        let response = material.respond(&element.strain(&u), committed(history, index));
-        sum.energy += element.volume * response.energy;
-        sum.plastic += usize::from(response.plastic);
-        let mut local = [0.0; 12];
-        element.add_internal(&response.stress, &mut local);
-        for (k, force) in local.iter().enumerate() {
-            forces[3 * nodes[k / 3] as usize + k % 3] += force;
+        sum.terms.add(&points, modulus, &u);
+        let mut plastic = false;
+        let mut local = [[0.0; 3]; N];
+        for (k, point) in points.iter().enumerate() {
+            let response = material.respond(&point.strain(&u), committed(history, P * index + k));
+            sum.energy += point.weight * response.energy;
+            plastic |= response.plastic;
+            point.add_internal(&response.stress, &mut local);
+        }
+        sum.plastic += usize::from(plastic);
+        for (&node, force) in nodes.iter().zip(&local) {
+            (0..3).for_each(|i| forces[3 * node as usize + i] += force[i]);
         }
     }
     sum
 }
 
 /// What the elements answer to `u`, one step from the committed `history`.
-pub fn responses<'a>(
-    subdomain: &'a Subdomain,
-    material: &'a Material,
-    history: &'a [History],
-    u: &'a [f64],
-) -> impl Iterator<Item = Response> + 'a {
-    subdomain.elements.iter().enumerate().map(move |(index, nodes)| {
-        let strain = geometry(&subdomain.points, nodes).strain(&displacements(u, nodes));
-        material.respond(&strain, committed(history, index))
-    })
+pub fn answers(subdomain: &Subdomain, material: &Material, history: &[History], u: &[f64]) -> Vec<Answer> {
+    by_kind!(subdomain.elements.kind(), answers_of(subdomain, material, history, u))
+}
+
+fn answers_of<const N: usize, const P: usize>(
+    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
+    subdomain: &Subdomain,
+    material: &Material,
+    history: &[History],
+    u: &[f64],
+) -> Vec<Answer> {
+    let elements = integrated(points, &subdomain.elements, &subdomain.points).enumerate();
+    elements
+        .map(|(index, (nodes, points))| {
+            let u = displacements(u, nodes);
+            let volume: f64 = points.iter().map(|point| point.weight).sum();
+            let mut answer = Answer::default();
+            for (k, point) in points.iter().enumerate() {
+                let response = material.respond(&point.strain(&u), committed(history, P * index + k));
+                let share = point.weight / volume;
+                answer.von_mises += share * von_mises(&response.stress);
+                answer.kappa += share * response.kappa;
+                answer.plastic |= response.plastic;
+            }
+            answer
+        })
+        .collect()
 }
 
 /// Commits the step that ends at `u`.
 pub fn commit(subdomain: &Subdomain, material: &Material, u: &[f64], history: &mut Vec<History>) {
-    history.resize(subdomain.elements.len(), History::default());
-    for (nodes, history) in subdomain.elements.iter().zip(history) {
-        let strain = geometry(&subdomain.points, nodes).strain(&displacements(u, nodes));
-        *history = material.commit(&strain, history);
+    by_kind!(subdomain.elements.kind(), commit_of(subdomain, material, u, history))
+}
+
+fn commit_of<const N: usize, const P: usize>(
+    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
+    subdomain: &Subdomain,
+    material: &Material,
+    u: &[f64],
+    history: &mut Vec<History>,
+) {
+    history.resize(P * subdomain.elements.len(), History::default());
+    let elements = integrated(points, &subdomain.elements, &subdomain.points);
+    for ((nodes, points), history) in elements.zip(history.as_chunks_mut::<P>().0) {
+        let u = displacements(u, nodes);
+        for (point, history) in points.iter().zip(history) {
+            *history = material.commit(&point.strain(&u), history);
+        }
     }
 }
 
 /// The elements that yield at `u`, one step from the committed `history`, by their nodes.
 pub fn yielding<'a>(
     subdomain: &'a Subdomain,
-    material: &'a Material,
-    history: &'a [History],
-    u: &'a [f64],
-) -> impl Iterator<Item = &'a [u32; 4]> {
-    let responses = responses(subdomain, material, history, u);
-    subdomain.elements.iter().zip(responses).filter(|(_, response)| response.plastic).map(|(nodes, _)| nodes)
+    material: &Material,
+    history: &[History],
+    u: &[f64],
+) -> impl Iterator<Item = &'a [u32]> + use<'a> {
+    let answers = answers(subdomain, material, history, u);
+    subdomain.elements.iter().zip(answers).filter(|(_, answer)| answer.plastic).map(|(nodes, _)| nodes)
 }
 
 /// `v'K_e v` of each vector (energy).
-pub fn elastic_squares<const N: usize>(subdomain: &Subdomain, material: &Material, vectors: [&[f64]; N]) -> [f64; N] {
+pub fn elastic_squares<const M: usize>(subdomain: &Subdomain, material: &Material, vectors: [&[f64]; M]) -> [f64; M] {
+    by_kind!(subdomain.elements.kind(), elastic_squares_of(subdomain, material, vectors))
+}
+
+fn elastic_squares_of<const N: usize, const P: usize, const M: usize>(
+    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
+    subdomain: &Subdomain,
+    material: &Material,
+    vectors: [&[f64]; M],
+) -> [f64; M] {
     let tangent = material.elastic_tangent();
-    let mut squares = [0.0; N];
-    for nodes in &subdomain.elements {
-        let element = geometry(&subdomain.points, nodes);
+    let mut squares = [0.0; M];
+    for (nodes, points) in integrated(points, &subdomain.elements, &subdomain.points) {
         for (square, v) in squares.iter_mut().zip(vectors) {
-            let strain: Voigt = element.strain(&displacements(v, nodes));
-            *square += element.volume * contract(&apply(&tangent, &strain), &strain);
+            let v = displacements(v, nodes);
+            for point in &points {
+                let strain: Voigt = point.strain(&v);
+                *square += point.weight * contract(&apply(&tangent, &strain), &strain);
+            }
         }
     }
     squares

@@ -1,8 +1,8 @@
-//! `f`: consistent nodal forces of dead loads. Linear shape functions share a constant load out evenly: a third of each
-//! triangle's force to its corners, a quarter of each tetrahedron's.
+//! `f`: consistent nodal forces of dead loads, shared out by the shape functions of each face and element.
 
-use super::geometry;
+use super::integrated;
 use crate::decomposition::Subdomain;
+use crate::element::{Kind, Nodal, Point, tet4};
 use crate::mesh::surface;
 
 /// A uniform load on a named surface or in a body.
@@ -42,30 +42,47 @@ impl Load {
     }
 }
 
-/// Adds the nodal forces of all loads to `forces`. Triangles and tetrahedra belong to one subdomain, so nothing counts
+/// Adds the nodal forces of all loads to `forces`. Faces and elements belong to one subdomain, so nothing counts
 /// twice.
 pub fn add(subdomain: &Subdomain, loads: &[Load], forces: &mut [f64]) {
     let mut give = |node: u32, share: [f64; 3]| (0..3).for_each(|a| forces[3 * node as usize + a] += share[a]);
     for facet in &subdomain.facets {
-        let corners = facet.nodes.map(|n| subdomain.points[n as usize]);
+        let face: Vec<[f64; 3]> = facet.nodes.iter().map(|&n| subdomain.points[n as usize]).collect();
         for load in loads {
-            let share = match load {
-                Load::Traction { surface, value } if *surface == facet.surface => {
-                    surface::corner_force(&corners, value)
+            for (&node, share) in facet.nodes.iter().zip(surface::shares(&face)) {
+                match load {
+                    Load::Traction { surface, value } if *surface == facet.surface => {
+                        give(node, value.map(|v| surface::length(&share) * v));
+                    }
+                    Load::Pressure { surface, value } if *surface == facet.surface => {
+                        give(node, share.map(|n| -value * n));
+                    }
+                    _ => {}
                 }
-                Load::Pressure { surface, value } if *surface == facet.surface => {
-                    surface::area_vector(&corners).map(|n| -value * n / 3.0)
-                }
-                _ => continue,
-            };
-            facet.nodes.iter().for_each(|&node| give(node, share));
+            }
         }
     }
     for load in loads {
         let Load::BodyForce { body, value } = load else { continue };
-        for nodes in subdomain.elements.iter().filter(|_| *body == subdomain.body) {
-            let quarter = geometry(&subdomain.points, nodes).volume / 4.0;
-            nodes.iter().for_each(|&node| give(node, value.map(|v| quarter * v)));
+        if *body == subdomain.body {
+            let mut give = |node: u32, volume: f64| give(node, value.map(|v| volume * v));
+            match subdomain.elements.kind() {
+                Kind::Tet4 => share_volumes(tet4::points, &tet4::VALUES, subdomain, &mut give),
+            }
+        }
+    }
+}
+
+/// Tells the integral over each element of its nodes' shape functions, which have these values at its points.
+fn share_volumes<const N: usize, const P: usize>(
+    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
+    values: &[[f64; N]; P],
+    subdomain: &Subdomain,
+    give: &mut impl FnMut(u32, f64),
+) {
+    for (nodes, points) in integrated(points, &subdomain.elements, &subdomain.shape) {
+        for (point, values) in points.iter().zip(values) {
+            nodes.iter().zip(values).for_each(|(&node, value)| give(node, point.weight * value));
         }
     }
 }

@@ -7,23 +7,34 @@ pub mod loads;
 pub mod pattern;
 pub mod stiffness;
 
-use crate::element::tet4::Tet4;
+use crate::element::{Nodal, Point};
 use crate::material::History;
+use crate::mesh::Elements;
 
-/// Geometry of an element of a mesh with these points. Cut and mesh were checked before: elements are sound here.
-fn geometry(points: &[[f64; 3]], nodes: &[u32; 4]) -> Tet4 {
-    Tet4::new(&nodes.map(|n| points[n as usize])).expect("elements of a checked mesh have volume")
+/// Nodes and integration points of each element; nodes are at `places`. Cut and mesh were checked before: elements are
+/// sound here.
+#[inline]
+fn integrated<'a, const N: usize, const P: usize>(
+    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]> + 'a,
+    elements: &'a Elements,
+    places: &'a [[f64; 3]],
+) -> impl Iterator<Item = (&'a [u32; N], [Point<N>; P])> {
+    elements.of::<N>().iter().map(move |nodes| {
+        (nodes, points(&nodes.map(|n| places[n as usize])).expect("elements of a checked mesh have volume"))
+    })
 }
 
 /// Nodal displacements of an element.
-fn displacements(u: &[f64], nodes: &[u32; 4]) -> [f64; 12] {
-    std::array::from_fn(|k| u[3 * nodes[k / 3] as usize + k % 3])
+#[inline]
+fn displacements<const N: usize>(u: &[f64], nodes: &[u32; N]) -> Nodal<N> {
+    nodes.map(|n| std::array::from_fn(|i| u[3 * n as usize + i]))
 }
 
-/// What an element remembers; no histories at all mean that nothing ever yielded.
-fn committed(history: &[History], element: usize) -> &History {
+/// What an integration point remembers; no histories at all mean that nothing ever yielded.
+#[inline]
+fn committed(history: &[History], point: usize) -> &History {
     const VIRGIN: &History = &History { plastic_strain: [0.0; 6], kappa: 0.0 };
-    history.get(element).unwrap_or(VIRGIN)
+    history.get(point).unwrap_or(VIRGIN)
 }
 
 #[cfg(test)]

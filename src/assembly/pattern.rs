@@ -2,6 +2,8 @@
 //!
 //! Depends on the connectivity only, so congruent subdomains share one.
 
+use crate::mesh::Elements;
+
 /// Lower triangle by columns, diagonal first; entries of one node lie together in every column.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Pattern {
@@ -15,13 +17,9 @@ pub struct Pattern {
 
 impl Pattern {
     /// Of elements on `nodes` nodes, with all nodes of `clique` coupled besides.
-    pub fn new(nodes: usize, elements: &[[u32; 4]], clique: &[u32]) -> Self {
-        let mut pairs: Vec<(u32, u32)> = elements
-            .iter()
-            .flat_map(|tet| (0..16).map(|k| (tet[k / 4], tet[k % 4])))
-            .chain(clique.iter().flat_map(|&a| clique.iter().map(move |&b| (a, b))))
-            .filter(|(a, b)| a != b)
-            .collect();
+    pub fn new(nodes: usize, elements: &Elements, clique: &[u32]) -> Self {
+        let among = |nodes| pairs(nodes).filter(|(a, b)| a != b);
+        let mut pairs: Vec<(u32, u32)> = elements.iter().chain([clique]).flat_map(among).collect();
         pairs.sort_unstable();
         pairs.dedup();
         let mut begins = vec![0; nodes + 1];
@@ -114,13 +112,23 @@ impl Pattern {
     }
 }
 
+/// All pairs of some nodes.
+fn pairs(nodes: &[u32]) -> impl Iterator<Item = (u32, u32)> {
+    nodes.iter().flat_map(move |&a| nodes.iter().map(move |&b| (a, b)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::Kind;
+
+    fn tets(nodes: &[[u32; 4]]) -> Elements {
+        Elements::new(Kind::Tet4, nodes.concat())
+    }
 
     #[test]
     fn differences_count_relative_to_the_diagonal() {
-        let pattern = Pattern::new(4, &[[0, 1, 2, 3]], &[]);
+        let pattern = Pattern::new(4, &tets(&[[0, 1, 2, 3]]), &[]);
         let mut values = vec![0.0; pattern.rows.len()];
         let block = |s: f64| [[s, 0.0, 0.0], [0.0, s, 0.0], [0.0, 0.0, s]];
         (0..4).for_each(|n| pattern.add_block(&mut values, n, n, &block(if n == 3 { 100.0 } else { 1.0 })));
@@ -134,7 +142,7 @@ mod tests {
 
     #[test]
     fn blocks_land_where_they_belong() {
-        let pattern = Pattern::new(5, &[[0, 1, 2, 3], [1, 2, 3, 4]], &[0, 4]);
+        let pattern = Pattern::new(5, &tets(&[[0, 1, 2, 3], [1, 2, 3, 4]]), &[0, 4]);
         // All pairs but (0, 4), which the clique adds: full lower triangle.
         assert_eq!(pattern.rows.len(), 15 * 16 / 2);
         let mut values = vec![0.0; pattern.rows.len()];

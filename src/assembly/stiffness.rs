@@ -1,8 +1,10 @@
 //! `K_k`: the consistent tangent of a subdomain; at rest it is the elastic stiffness `K_e`.
 
 use super::pattern::Pattern;
-use super::{committed, displacements, geometry};
+use super::{committed, displacements, integrated};
 use crate::decomposition::Subdomain;
+use crate::element::point::mirror;
+use crate::element::{Nodal, Point, by_kind};
 use crate::material::{History, Material};
 
 /// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed `history`.
@@ -15,23 +17,40 @@ pub fn assemble(
     pattern: &Pattern,
     values: &mut [f64],
 ) -> usize {
+    by_kind!(subdomain.elements.kind(), assemble_of(subdomain, material, history, u, pattern, values))
+}
+
+fn assemble_of<const N: usize, const P: usize>(
+    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
+    subdomain: &Subdomain,
+    material: &Material,
+    history: &[History],
+    u: &[f64],
+    pattern: &Pattern,
+    values: &mut [f64],
+) -> usize {
     values.fill(0.0);
     let elastic = material.elastic_tangent();
     let mut plastic = 0;
-    for (index, nodes) in subdomain.elements.iter().enumerate() {
-        let committed = committed(history, index);
-        let element = geometry(&subdomain.shape, nodes);
-        let strain = element.strain(&displacements(u, nodes));
-        let k = if material.respond(&strain, committed).plastic {
-            plastic += 1;
-            element.stiffness(&material.tangent(&strain, committed))
-        } else {
-            element.stiffness(&elastic)
-        };
-        for (a, &row) in nodes.iter().enumerate() {
+    for (index, (nodes, points)) in integrated(points, &subdomain.elements, &subdomain.shape).enumerate() {
+        let u = displacements(u, nodes);
+        let mut k = [[[[0.0; 3]; N]; 3]; N];
+        let mut yields = false;
+        for (at, point) in points.iter().enumerate() {
+            let committed = committed(history, P * index + at);
+            let strain = point.strain(&u);
+            if material.respond(&strain, committed).plastic {
+                yields = true;
+                point.add_stiffness(&material.tangent(&strain, committed), &mut k);
+            } else {
+                point.add_stiffness(&elastic, &mut k);
+            }
+        }
+        mirror(&mut k);
+        plastic += usize::from(yields);
+        for (rows, &row) in k.iter().zip(nodes) {
             for (b, &column) in nodes.iter().enumerate().filter(|&(_, &column)| column <= row) {
-                let block = std::array::from_fn(|i| std::array::from_fn(|j| k[3 * a + i][3 * b + j]));
-                pattern.add_block(values, row, column, &block);
+                pattern.add_block(values, row, column, &rows.map(|row| row[b]));
             }
         }
     }

@@ -20,7 +20,7 @@ impl GatheredSurface {
         let mut mine = Vec::new();
         for subdomain in subdomains {
             for facet in subdomain.facets.iter().filter(|f| f.surface == surface) {
-                for node in facet.nodes.map(|n| n as usize) {
+                for node in facet.nodes.iter().map(|&n| n as usize) {
                     mine.push(subdomain.nodes[node]);
                     mine.extend(subdomain.points[node].map(f64::to_bits));
                 }

@@ -2,7 +2,7 @@
 //!
 //! A part that falls into pieces, or hangs together by an edge or a vertex only, has more than six rigid body modes.
 
-use crate::mesh::faces::{Neighbours, OUTSIDE};
+use crate::mesh::faces::Neighbours;
 
 /// Splits every part into its face-connected pieces. `parts[e]` is the part of element `e`. Pieces are numbered
 /// consecutively in the order of their parts (empty parts vanish), within a part by first element. Returns the number of
@@ -20,7 +20,7 @@ pub fn split_into_pieces(parts: &mut [i32], neighbours: &Neighbours) -> usize {
         pieces[seed] = piece;
         stack.push(seed);
         while let Some(element) = stack.pop() {
-            for other in neighbours.behind[element].into_iter().filter(|&o| o != OUTSIDE).map(|o| o as usize) {
+            for other in neighbours.of(element).map(|o| o as usize) {
                 if pieces[other] == usize::MAX && parts[other] == parts[element] {
                     pieces[other] = piece;
                     stack.push(other);
@@ -43,15 +43,15 @@ pub fn split_into_pieces(parts: &mut [i32], neighbours: &Neighbours) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::Kind;
+    use crate::mesh::Elements;
 
     #[test]
     fn a_part_in_two_pieces_becomes_two_and_empty_parts_vanish() {
         // A chain of five elements; part 0 holds both ends, part 2 is empty.
-        let next = |k: u32| [k + 1, OUTSIDE, OUTSIDE, k.wrapping_sub(1)];
-        let mut behind: Vec<_> = (0..5).map(next).collect();
-        behind[4][0] = OUTSIDE;
+        let elements = Elements::new(Kind::Tet4, (0..5).flat_map(|k| k..k + 4).collect());
         let mut parts = [0, 1, 1, 3, 0];
-        assert_eq!(split_into_pieces(&mut parts, &Neighbours { behind, overlapping: 0 }), 4);
+        assert_eq!(split_into_pieces(&mut parts, &Neighbours::new(8, &elements)), 4);
         assert_eq!(parts, [0, 2, 2, 3, 1]);
     }
 }

@@ -17,8 +17,9 @@ use super::connectivity::split_into_pieces;
 use super::shares::{by_cost, interleave};
 use super::{Bodies, Patch, Shape, Subdomain};
 use crate::comm::{Comm, Shares};
+use crate::mesh::Elements;
 use crate::mesh::brick::indices;
-use crate::mesh::faces::{Neighbours, OUTSIDE, key};
+use crate::mesh::faces::{Neighbours, key};
 
 /// How much dearer it is to cut between two elements at a contact surface.
 const AT_CONTACT: i32 = 5;
@@ -32,7 +33,7 @@ pub(crate) fn own_subdomains(bodies: &Bodies, parts: usize, comm: &dyn Comm) -> 
         let order = interleave(&lists.iter().map(Vec::len).collect::<Vec<_>>());
         let costs: Vec<u64> = order.iter().map(|&(body, part)| lists[body][part].len() as u64).collect();
         let shares = by_cost(&costs, comm.size());
-        let surfaces: HashMap<_, _> = bodies.meshes.keys().map(|&body| (body, triangles(bodies, body))).collect();
+        let surfaces: HashMap<_, _> = bodies.meshes.keys().map(|&body| (body, faces(bodies, body))).collect();
         for (id, (body, part)) in order.into_iter().enumerate() {
             let elements = &lists[body][part];
             let message = &mut outgoing[shares.owner(id)];
@@ -50,7 +51,7 @@ pub(crate) fn own_subdomains(bodies: &Bodies, parts: usize, comm: &dyn Comm) -> 
     let mut own = Vec::new();
     while let Some(body) = message.next() {
         own.extend(match bodies.bodies[body as usize].shape {
-            Shape::Tets(_) => Subdomain::unpack(&mut message),
+            Shape::Mesh(_) => Subdomain::unpack(bodies.bodies[body as usize].kind, &mut message),
             Shape::Brick(_) => {
                 let [id, length] = [(); 2].map(|()| message.next().expect("a list is whole") as usize);
                 let elements: Vec<u64> = message.by_ref().take(length).collect();
@@ -97,13 +98,13 @@ fn spread(parts: usize, sizes: &[u64]) -> Vec<usize> {
     result
 }
 
-/// Named surfaces of the boundary triangles of a mesh, by ascending nodes.
-fn triangles(bodies: &Bodies, body: usize) -> HashMap<[u32; 3], Vec<usize>> {
+/// Named surfaces of the boundary faces of a mesh, by ascending nodes.
+fn faces(bodies: &Bodies, body: usize) -> HashMap<Vec<u32>, Vec<usize>> {
     let mut result: HashMap<_, Vec<usize>> = HashMap::new();
     for (index, surface) in bodies.surfaces.iter().enumerate().filter(|(_, s)| s.body == body) {
         if let Patch::Named(name) = &surface.patch {
-            for &triangle in bodies.meshes[&body].surface(name) {
-                result.entry(key(triangle)).or_default().push(index);
+            for face in bodies.meshes[&body].surface(name) {
+                result.entry(key(face)).or_default().push(index);
             }
         }
     }
@@ -121,21 +122,22 @@ struct DualGraph {
 
 impl DualGraph {
     fn new(bodies: &Bodies, body: usize) -> Self {
-        let tets: Cow<[[u32; 4]]> = match &bodies.bodies[body].shape {
-            Shape::Brick(brick) => {
-                let cells = indices(&brick.all_cells());
-                cells.flat_map(|cell| brick.tets(cell)).map(|tet| tet.map(|n| n as u32)).collect()
+        let mesh = &bodies.bodies[body];
+        let elements = match mesh.shape {
+            Shape::Brick(_) => {
+                let nodes = (0..mesh.counts().elements).flat_map(|element| mesh.element(element));
+                Cow::Owned(Elements::new(mesh.kind, nodes.map(|n| n as u32).collect()))
             }
-            Shape::Tets(_) => Cow::Borrowed(&bodies.meshes[&body].tets),
+            Shape::Mesh(_) => Cow::Borrowed(&bodies.meshes[&body].elements),
         };
-        let nodes = bodies.bodies[body].counts().nodes as usize;
-        let neighbours = Neighbours::new(nodes, &tets);
-        let mut piece_of = vec![0; tets.len()];
+        let nodes = mesh.counts().nodes as usize;
+        let neighbours = Neighbours::new(nodes, &elements);
+        let mut piece_of = vec![0; elements.len()];
         let mut pieces = vec![Vec::new(); split_into_pieces(&mut piece_of, &neighbours)];
         (0..).zip(piece_of).for_each(|(element, piece)| pieces[piece as usize].push(element));
         let mut touching = vec![false; nodes];
         contact_nodes(bodies, body).into_iter().for_each(|node| touching[node as usize] = true);
-        let at_contact = tets.iter().map(|tet| tet.iter().any(|&n| touching[n as usize])).collect();
+        let at_contact = elements.iter().map(|nodes| nodes.iter().any(|&n| touching[n as usize])).collect();
         Self { neighbours, pieces, at_contact }
     }
 
@@ -159,7 +161,7 @@ impl DualGraph {
     fn cut(&self, piece: &[u32], local: &[i32], wanted: i32) -> Vec<i32> {
         let (mut begin, mut adjacency, mut weights) = (vec![0], Vec::new(), Vec::new());
         for &element in piece {
-            for other in self.neighbours.behind[element as usize].into_iter().filter(|&o| o != OUTSIDE) {
+            for other in self.neighbours.of(element as usize) {
                 adjacency.push(local[other as usize]);
                 let both = self.at_contact[element as usize] && self.at_contact[other as usize];
                 weights.push(if both { AT_CONTACT } else { 1 });
@@ -182,14 +184,14 @@ impl DualGraph {
 /// Nodes of a body on contact surfaces, some several times.
 fn contact_nodes(bodies: &Bodies, body: usize) -> Vec<u64> {
     let nodes = |patch: &Patch| -> Vec<u64> {
-        match (&bodies.bodies[body].shape, patch) {
-            (Shape::Brick(brick), Patch::Face(face)) => {
-                indices(&brick.nodes_on(*face)).map(|at| brick.node(at)).collect()
+        match (bodies.bodies[body].lattice(), patch) {
+            (Some(lattice), Patch::Face(face)) => {
+                indices(&lattice.nodes_on(*face)).map(|at| lattice.node(at)).collect()
             }
             (_, Patch::Named(name)) => {
-                bodies.meshes[&body].surface(name).as_flattened().iter().map(|&n| u64::from(n)).collect()
+                bodies.meshes[&body].surface(name).iter().flatten().map(|&n| u64::from(n)).collect()
             }
-            (Shape::Tets(_), Patch::Face(_)) => Vec::new(),
+            (None, Patch::Face(_)) => Vec::new(),
         }
     };
     let surfaces = bodies.contact.iter().map(|&index| &bodies.surfaces[index]).filter(|s| s.body == body);

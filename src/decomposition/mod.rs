@@ -19,9 +19,8 @@ pub use subdomain::{Facet, Subdomain};
 use std::collections::BTreeMap;
 
 use crate::comm::{Comm, Shares};
-use crate::mesh::brick::Brick;
-use crate::mesh::face::Face;
-use crate::mesh::tets::TetMesh;
+use crate::element::Kind;
+use crate::mesh::{Brick, Face, SolidMesh};
 
 /// A surface that a support, load or contact names.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -44,6 +43,8 @@ pub enum Patch {
 /// What every rank knows of a body's mesh before tearing; its nodes are numbered behind those of the bodies before it.
 #[derive(Clone, Debug)]
 pub struct BodyMesh {
+    /// Its elements.
+    pub kind: Kind,
     /// Where nodes and elements come from.
     pub shape: Shape,
     /// Number of nodes of all bodies before this one.
@@ -55,8 +56,8 @@ pub struct BodyMesh {
 pub enum Shape {
     /// Any rank can generate them.
     Brick(Brick),
-    /// Rank 0 has them, as a [`TetMesh`], until they are torn; the others know how many there are.
-    Tets(Counts),
+    /// Rank 0 has them, as a [`SolidMesh`], until they are torn; the others know how many there are.
+    Mesh(Counts),
 }
 
 /// Sizes of a mesh.
@@ -71,19 +72,38 @@ pub struct Counts {
 }
 
 impl BodyMesh {
-    /// The brick, if the body is one.
+    /// The brick, if the body is one: its cells.
     pub fn brick(&self) -> Option<&Brick> {
         match &self.shape {
             Shape::Brick(brick) => Some(brick),
-            Shape::Tets(_) => None,
+            Shape::Mesh(_) => None,
+        }
+    }
+
+    /// The brick whose nodes are those of the body.
+    pub fn lattice(&self) -> Option<Brick> {
+        self.brick().copied()
+    }
+
+    /// Node numbers, within the body, of an element of a brick.
+    ///
+    /// # Panics
+    /// If the body is no brick.
+    pub fn element(&self, element: u64) -> Vec<u64> {
+        let brick = self.brick().expect("the body is a brick");
+        match self.kind {
+            Kind::Tet4 => brick.tet(element).to_vec(),
         }
     }
 
     /// Sizes of the mesh.
     pub fn counts(&self) -> Counts {
         match &self.shape {
-            Shape::Brick(b) => Counts { nodes: b.node_count(), cells: b.cell_count(), elements: b.element_count() },
-            Shape::Tets(counts) => *counts,
+            Shape::Brick(brick) => {
+                let (cells, nodes) = (brick.cell_count(), self.lattice().map_or(0, |lattice| lattice.node_count()));
+                Counts { nodes, cells, elements: self.kind.per_cell() * cells }
+            }
+            Shape::Mesh(counts) => *counts,
         }
     }
 }
@@ -93,7 +113,7 @@ pub struct Bodies<'a> {
     /// In the order of their names.
     pub bodies: &'a [BodyMesh],
     /// On rank 0 the meshes of bodies that are no bricks, by index; empty elsewhere.
-    pub meshes: &'a BTreeMap<usize, TetMesh>,
+    pub meshes: &'a BTreeMap<usize, SolidMesh>,
     /// Named surfaces; facets and interface nodes refer to them by index.
     pub surfaces: &'a [Surface],
     /// Indices of those that may touch another body.
@@ -128,12 +148,12 @@ impl Decomposition {
 }
 
 /// Lays bodies one behind the other in one numbering of nodes.
-pub fn number_bodies(shapes: Vec<Shape>) -> Vec<BodyMesh> {
+pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape)>) -> Vec<BodyMesh> {
     let mut first_node = 0;
     shapes
         .into_iter()
-        .map(|shape| {
-            let body = BodyMesh { first_node, shape };
+        .map(|(kind, shape)| {
+            let body = BodyMesh { first_node, kind, shape };
             first_node += body.counts().nodes;
             body
         })

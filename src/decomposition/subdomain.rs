@@ -3,19 +3,20 @@
 use std::collections::HashMap;
 
 use super::{Bodies, BodyMesh, Patch, Surface};
-use crate::mesh::TetMesh;
+use crate::element::Kind;
 use crate::mesh::faces::{Neighbours, key};
+use crate::mesh::{Elements, SolidMesh};
 
-/// A triangle on a named surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A face on a named surface.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Facet {
     /// Index into the list of named surfaces.
     pub surface: usize,
-    /// Local nodes, counter-clockwise seen from outside.
-    pub nodes: [u32; 3],
+    /// Local nodes, corners first, counter-clockwise seen from outside.
+    pub nodes: Vec<u32>,
 }
 
-/// A face-connected set of tetrahedra. Local nodes ascend in global numbering, elements likewise, so that congruent
+/// A face-connected set of elements of one kind. Local nodes ascend in global numbering, elements likewise, so that congruent
 /// boxes of one brick are numbered alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subdomain {
@@ -30,42 +31,42 @@ pub struct Subdomain {
     /// Coordinates relative to the first node: congruent boxes have the same bits here, and so has what is computed
     /// from them alone.
     pub shape: Vec<[f64; 3]>,
-    /// Local nodes of each element.
-    pub elements: Vec<[u32; 4]>,
-    /// Triangles on named surfaces.
+    /// Elements by their local nodes.
+    pub elements: Elements,
+    /// Faces on named surfaces.
     pub facets: Vec<Facet>,
     /// Local nodes on this subdomain's boundary, ascending.
     pub boundary: Vec<u32>,
 }
 
 impl Subdomain {
-    /// From its elements (numbers of nodes within the body), the places of nodes and the ways between two, and the named
-    /// surfaces that a triangle is on.
+    /// From its elements (kind, and numbers of nodes within the body), the places of nodes and the ways between two, and
+    /// the named surfaces that a face is on.
     fn new(
         (id, body): (usize, usize),
         first_node: u64,
-        tets: &[[u64; 4]],
+        (kind, of_elements): (Kind, &[u64]),
         point: impl Fn(u64) -> [f64; 3],
         way: impl Fn(u64, u64) -> [f64; 3],
-        surfaces: impl Fn([u64; 3]) -> Vec<usize>,
+        surfaces: impl Fn(&[u64]) -> Vec<usize>,
     ) -> Self {
-        let mut nodes: Vec<u64> = tets.iter().flatten().copied().collect();
+        let mut nodes = of_elements.to_vec();
         nodes.sort_unstable();
         nodes.dedup();
-        let local = |node: u64| nodes.binary_search(&node).expect("every corner is listed") as u32;
+        let local = |node: u64| nodes.binary_search(&node).expect("every node is listed") as u32;
         let points = nodes.iter().map(|&node| point(node)).collect();
         let shape = nodes.iter().map(|&node| way(nodes[0], node)).collect();
-        let elements: Vec<[u32; 4]> = tets.iter().map(|tet| tet.map(local)).collect();
+        let elements = Elements::new(kind, of_elements.iter().map(|&node| local(node)).collect());
 
-        let mut outer: Vec<[u32; 3]> = Neighbours::new(nodes.len(), &elements).outer(&elements).collect();
+        let mut outer: Vec<Vec<u32>> = Neighbours::new(nodes.len(), &elements).outer(&elements).collect();
         outer.sort_unstable();
         let mut boundary: Vec<u32> = outer.iter().flatten().copied().collect();
         boundary.sort_unstable();
         boundary.dedup();
         let mut facets = Vec::new();
-        for triangle in outer {
-            let surfaces = surfaces(triangle.map(|n| nodes[n as usize]));
-            facets.extend(surfaces.into_iter().map(|surface| Facet { surface, nodes: triangle }));
+        for face in outer {
+            let global: Vec<u64> = face.iter().map(|&n| nodes[n as usize]).collect();
+            facets.extend(surfaces(&global).into_iter().map(|surface| Facet { surface, nodes: face.clone() }));
         }
         let nodes = nodes.iter().map(|node| first_node + node).collect();
         Self { id, body, nodes, points, shape, elements, facets, boundary }
@@ -76,34 +77,39 @@ impl Subdomain {
     /// # Panics
     /// If the body is no brick.
     pub fn of_brick(id: usize, bodies: &Bodies, body: usize, elements: &[u64]) -> Self {
-        let BodyMesh { first_node, .. } = bodies.bodies[body];
-        let brick = bodies.bodies[body].brick().expect("the body is a brick");
-        let on = |surface: &Surface, triangle: &[u64; 3]| match surface.patch {
-            Patch::Face(face) => triangle.iter().all(|&node| brick.is_on(face, brick.node_position(node))),
+        let BodyMesh { first_node, kind, .. } = bodies.bodies[body];
+        let lattice = bodies.bodies[body].lattice().expect("the body is a brick");
+        let on = |surface: &Surface, face: &[u64]| match surface.patch {
+            Patch::Face(side) => face.iter().all(|&node| lattice.is_on(side, lattice.node_position(node))),
             Patch::Named(_) => false,
         };
-        let surfaces = |triangle| {
+        let surfaces = |face: &[u64]| {
             let of_body = bodies.surfaces.iter().enumerate().filter(|(_, s)| s.body == body);
-            of_body.filter(|(_, s)| on(s, &triangle)).map(|(index, _)| index).collect()
+            of_body.filter(|(_, s)| on(s, face)).map(|(index, _)| index).collect()
         };
-        let tets: Vec<[u64; 4]> = elements.iter().map(|&e| brick.tet(e)).collect();
-        let point = |node| brick.coordinates(brick.node_position(node));
-        Self::new((id, body), first_node, &tets, point, |from, to| brick.way(from, to), surfaces)
+        let nodes: Vec<u64> = elements.iter().flat_map(|&e| bodies.bodies[body].element(e)).collect();
+        let point = |node| lattice.coordinates(lattice.node_position(node));
+        Self::new((id, body), first_node, (kind, &nodes), point, |from, to| lattice.way(from, to), surfaces)
     }
 
-    /// Of a mesh, from the numbers of its elements within the body (ascending), and the named surfaces of its triangles,
+    /// Of a mesh, from the numbers of its elements within the body (ascending), and the named surfaces of its faces,
     /// by ascending nodes.
     pub fn of_mesh(
         (id, body): (usize, usize),
         first_node: u64,
-        mesh: &TetMesh,
+        mesh: &SolidMesh,
         elements: &[u64],
-        surfaces: &HashMap<[u32; 3], Vec<usize>>,
+        surfaces: &HashMap<Vec<u32>, Vec<usize>>,
     ) -> Self {
-        let tets: Vec<[u64; 4]> = elements.iter().map(|&e| mesh.tets[e as usize].map(u64::from)).collect();
-        let surfaces = |triangle: [u64; 3]| surfaces.get(&key(triangle.map(|n| n as u32))).cloned().unwrap_or_default();
+        let nodes: Vec<u64> =
+            elements.iter().flat_map(|&e| mesh.elements.get(e as usize)).map(|&n| u64::from(n)).collect();
+        let surfaces = |face: &[u64]| {
+            let face: Vec<u32> = face.iter().map(|&n| n as u32).collect();
+            surfaces.get(&key(&face)).cloned().unwrap_or_default()
+        };
         let point = |node: u64| mesh.points[node as usize];
-        Self::new((id, body), first_node, &tets, point, |from, to| relative(point(from), point(to)), surfaces)
+        let way = |from, to| relative(point(from), point(to));
+        Self::new((id, body), first_node, (mesh.elements.kind(), &nodes), point, way, surfaces)
     }
 
     /// Number of local unknowns.
@@ -122,14 +128,16 @@ impl Subdomain {
         message.extend([*id, *body, nodes.len(), elements.len(), facets.len(), boundary.len()].map(|n| n as u64));
         message.extend(nodes);
         message.extend(points.as_flattened().iter().map(|x| x.to_bits()));
-        message.extend(elements.iter().flat_map(|tet| [pair(tet[0], tet[1]), pair(tet[2], tet[3])]));
-        let nodes = |f: &Facet| [f.surface as u64, pair(f.nodes[0], f.nodes[1]), u64::from(f.nodes[2])];
-        message.extend(facets.iter().flat_map(nodes));
-        message.extend(boundary.iter().map(|&n| u64::from(n)));
+        pack_pairs(elements.nodes(), message);
+        for facet in facets {
+            message.push(facet.surface as u64);
+            pack_pairs(&facet.nodes, message);
+        }
+        pack_pairs(boundary, message);
     }
 
-    /// What [`Subdomain::pack`] made; `None` at the end of the message.
-    pub fn unpack(message: &mut impl Iterator<Item = u64>) -> Option<Self> {
+    /// What [`Subdomain::pack`] made of elements of this kind; `None` at the end of the message.
+    pub fn unpack(kind: Kind, message: &mut impl Iterator<Item = u64>) -> Option<Self> {
         let id = message.next()? as usize;
         let mut next = || message.next().expect("a packed subdomain is whole");
         let [body, nodes, elements, facets, boundary] = [(); 5].map(|()| next() as usize);
@@ -141,19 +149,11 @@ impl Subdomain {
             nodes: of_nodes,
             shape: points.iter().map(|&point| relative(points[0], point)).collect(),
             points,
-            elements: (0..elements)
-                .map(|_| {
-                    let ([a, b], [c, d]) = (unpair(next()), unpair(next()));
-                    [a, b, c, d]
-                })
-                .collect(),
+            elements: Elements::new(kind, unpack_pairs(elements * kind.nodes(), &mut next)),
             facets: (0..facets)
-                .map(|_| {
-                    let (surface, [a, b], c) = (next() as usize, unpair(next()), next() as u32);
-                    Facet { surface, nodes: [a, b, c] }
-                })
+                .map(|_| Facet { surface: next() as usize, nodes: unpack_pairs(kind.faces()[0].len(), &mut next) })
                 .collect(),
-            boundary: (0..boundary).map(|_| next() as u32).collect(),
+            boundary: unpack_pairs(boundary, &mut next),
         })
     }
 }
@@ -162,10 +162,13 @@ fn relative(from: [f64; 3], to: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|a| to[a] - from[a])
 }
 
-fn pair(low: u32, high: u32) -> u64 {
-    u64::from(high) << 32 | u64::from(low)
+/// Two numbers a word.
+fn pack_pairs(numbers: &[u32], message: &mut Vec<u64>) {
+    let pair = |pair: &[u32]| u64::from(pair.get(1).copied().unwrap_or_default()) << 32 | u64::from(pair[0]);
+    message.extend(numbers.chunks(2).map(pair));
 }
 
-fn unpair(pair: u64) -> [u32; 2] {
-    [pair as u32, (pair >> 32) as u32]
+fn unpack_pairs(count: usize, next: &mut impl FnMut() -> u64) -> Vec<u32> {
+    let words = (0..count.div_ceil(2)).map(|_| next());
+    words.flat_map(|pair| [pair as u32, (pair >> 32) as u32]).take(count).collect()
 }

@@ -1,13 +1,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Bodies, Counts, Cut, Facet, Patch, Shape, Subdomain, Surface, number_bodies, tear};
+use super::{Bodies, BodyMesh, Counts, Cut, Facet, Patch, Shape, Subdomain, Surface, number_bodies, tear};
 use crate::comm::solo::Solo;
 use crate::comm::threads;
-use crate::element::Tet4;
+use crate::element::{Kind, tet4};
 use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis, two_meshes};
 use crate::mesh::brick::indices;
 use crate::mesh::surface::area_vector;
-use crate::mesh::{Brick, Face, TetMesh};
+use crate::mesh::{Brick, Elements, Face, SolidMesh};
 use crate::scene::Scene;
 use crate::study::{discretise, sizes};
 
@@ -61,8 +61,8 @@ fn assert_hangs_together(subdomain: &Subdomain) {
     let mut front = vec![0];
     while let Some(element) = front.pop() {
         for (other, nodes) in subdomain.elements.iter().enumerate() {
-            let shared = nodes.iter().filter(|n| subdomain.elements[element].contains(n)).count();
-            if shared == 3 && reached.insert(other) {
+            let shared = nodes.iter().filter(|n| subdomain.elements.get(element).contains(n)).count();
+            if shared == subdomain.elements.kind().faces()[0].len() && reached.insert(other) {
                 front.push(other);
             }
         }
@@ -74,16 +74,15 @@ fn assert_hangs_together(subdomain: &Subdomain) {
 fn every_element_is_in_exactly_one_subdomain() {
     for scene in scenes() {
         on_ranks(&scene, 1, |setup| {
-            let global = |s: &Subdomain| -> Vec<[u64; 4]> {
-                s.elements.iter().map(|tet| tet.map(|n| s.nodes[n as usize])).collect()
+            let global = |s: &Subdomain| -> Vec<Vec<u64>> {
+                s.elements.iter().map(|nodes| nodes.iter().map(|&n| s.nodes[n as usize]).collect()).collect()
             };
-            let mut torn: Vec<[u64; 4]> = setup.subdomains().iter().flat_map(global).collect();
-            let mut whole: Vec<[u64; 4]> = setup
-                .discrete
-                .bodies
-                .iter()
-                .flat_map(|b| (0..b.counts().elements).map(|e| b.brick().unwrap().tet(e).map(|n| b.first_node + n)))
-                .collect();
+            let mut torn: Vec<Vec<u64>> = setup.subdomains().iter().flat_map(global).collect();
+            let of_body = |b: &BodyMesh| -> Vec<Vec<u64>> {
+                let element = |e| b.element(e).into_iter().map(|n| b.first_node + n).collect();
+                (0..b.counts().elements).map(element).collect()
+            };
+            let mut whole: Vec<Vec<u64>> = setup.discrete.bodies.iter().flat_map(of_body).collect();
             torn.sort_unstable();
             whole.sort_unstable();
             assert_eq!(torn, whole, "{:?}", scene.decomposition);
@@ -93,7 +92,7 @@ fn every_element_is_in_exactly_one_subdomain() {
 
 #[test]
 fn subdomains_are_the_same_on_any_number_of_ranks_and_idle_ranks_do_no_harm() {
-    type Plain = (usize, usize, Vec<u64>, Vec<[u32; 4]>, Vec<Facet>, Vec<u32>);
+    type Plain = (usize, usize, Vec<u64>, Elements, Vec<Facet>, Vec<u32>);
     let plain = |s: &Subdomain| -> Plain {
         (s.id, s.body, s.nodes.clone(), s.elements.clone(), s.facets.clone(), s.boundary.clone())
     };
@@ -156,7 +155,7 @@ fn volumes_and_areas(setup: &Setup) -> [Vec<f64>; 2] {
     for subdomain in setup.subdomains() {
         let at = |nodes: &[u32]| -> Vec<_> { nodes.iter().map(|&n| subdomain.points[n as usize]).collect() };
         for tet in &subdomain.elements {
-            volumes[subdomain.body] += Tet4::new(&at(tet).try_into().unwrap()).expect("it has a volume").volume;
+            volumes[subdomain.body] += tet4::points(&at(tet).try_into().unwrap()).expect("it has a volume")[0].weight;
         }
         for facet in &subdomain.facets {
             areas[facet.surface] += area_vector(&at(&facet.nodes).try_into().unwrap())[2];
@@ -185,29 +184,29 @@ fn subdomains_survive_sending() {
         let mut message = Vec::new();
         setup.subdomains().iter().for_each(|s| s.pack(&mut message));
         let mut message = message.into_iter();
-        let unpacked: Vec<_> = std::iter::from_fn(|| Subdomain::unpack(&mut message)).collect();
+        let unpacked: Vec<_> = std::iter::from_fn(|| Subdomain::unpack(Kind::Tet4, &mut message)).collect();
         assert!(unpacked == setup.subdomains());
     });
 }
 
-fn mesh_of(bricks: &[Brick]) -> TetMesh {
-    let mut mesh = TetMesh::default();
+fn mesh_of(bricks: &[Brick]) -> SolidMesh {
+    let (mut points, mut nodes) = (Vec::new(), Vec::new());
     for brick in bricks {
-        let first = mesh.points.len() as u32;
-        mesh.points.extend(indices(&brick.all_nodes()).map(|at| brick.coordinates(at)));
-        let tets = indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell));
-        mesh.tets.extend(tets.map(|tet| tet.map(|n| first + n as u32)));
+        let first = points.len() as u32;
+        points.extend(indices(&brick.all_nodes()).map(|at| brick.coordinates(at)));
+        let tets = indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell)).flatten();
+        nodes.extend(tets.map(|n| first + n as u32));
     }
-    mesh
+    SolidMesh { points, elements: Elements::new(Kind::Tet4, nodes), cells: 0, surfaces: Vec::new() }
 }
 
 #[test]
 fn a_body_of_several_pieces_is_cut_piece_by_piece() {
     let brick = |x: f64, cells| Brick { origin: [x, 0.0, 0.0], size: [1.0; 3], cells };
     let mesh = mesh_of(&[brick(0.0, [4, 4, 4]), brick(2.0, [1, 1, 1]), brick(4.0, [4, 4, 2])]);
-    let elements = mesh.tets.len();
+    let elements = mesh.elements.len();
     let counts = Counts { nodes: mesh.points.len() as u64, cells: 0, elements: elements as u64 };
-    let bodies = number_bodies(vec![Shape::Tets(counts)]);
+    let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(counts))]);
     let meshes = BTreeMap::from([(0, mesh)]);
     for parts in [1, 3, 12] {
         let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[], contact: &[] };
@@ -221,7 +220,7 @@ fn a_body_of_several_pieces_is_cut_piece_by_piece() {
 #[test]
 fn contact_surfaces_stay_on_fewer_subdomains() {
     let brick = Brick { origin: [0.0; 3], size: [3.0, 1.0, 1.0], cells: [24, 8, 8] };
-    let bodies = number_bodies(vec![Shape::Brick(brick)]);
+    let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick))]);
     let surfaces = [Surface { body: 0, patch: Patch::Face(Face::ZMax) }];
     let touching = |contact: &[usize]| {
         let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &surfaces, contact };

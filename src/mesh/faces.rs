@@ -1,48 +1,71 @@
-//! Which tetrahedra share a face.
+//! Which elements share a face.
 //!
-//! Faces are sorted into one bucket for each smallest node, so nothing but their numbers is stored: 16 bytes an element
+//! Faces are sorted into one bucket for each smallest corner, so nothing but their numbers is stored: four bytes a face
 //! while they are paired, as many for the result.
 
-/// Faces of a positively oriented tetrahedron, counter-clockwise from outside.
-pub const TET_FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+use super::Elements;
 
-/// In place of a neighbour: the face belongs to one tetrahedron only.
+/// In place of a neighbour: the face belongs to one element only.
 pub const OUTSIDE: u32 = u32::MAX;
 
-/// Neighbours of the tetrahedra of a mesh.
+/// Neighbours of the elements of a mesh.
 pub struct Neighbours {
-    /// For each tetrahedron and each of its [`TET_FACES`] the tetrahedron behind, or [`OUTSIDE`].
-    pub behind: Vec<[u32; 4]>,
-    /// Faces with more than two tetrahedra, or two on the same side: the mesh overlaps itself. Nobody is behind them.
+    /// Faces of an element.
+    faces: usize,
+    /// Element by element, for each face the element behind, or [`OUTSIDE`].
+    behind: Vec<u32>,
+    /// Faces with more than two elements, or two on the same side: the mesh overlaps itself. Nobody is behind them.
     pub overlapping: u64,
 }
 
 impl Neighbours {
-    /// Pairs up the faces of at most 2^30 tetrahedra on nodes `0..nodes`.
-    pub fn new(nodes: usize, tets: &[[u32; 4]]) -> Self {
+    /// Pairs up the faces, at most 2^32, of elements on nodes `0..nodes`.
+    pub fn new(nodes: usize, elements: &Elements) -> Self {
+        match elements.kind().corners_of_face() {
+            3 => Self::pair::<3>(nodes, elements),
+            _ => Self::pair::<4>(nodes, elements),
+        }
+    }
+
+    fn pair<const C: usize>(nodes: usize, elements: &Elements) -> Self {
+        let table: Vec<[usize; C]> =
+            elements.kind().faces().iter().map(|face| std::array::from_fn(|k| face[k])).collect();
+        let faces = table.len();
+        let rows = elements.kind().nodes();
+        let corners = |id: u32| {
+            let first = id as usize / faces * rows;
+            table[id as usize % faces].map(|corner| elements.nodes()[first + corner])
+        };
+        let ids = || 0..(faces * elements.len()) as u32;
+        let smallest = |id| corners(id).into_iter().min().expect("a face has corners") as usize;
         let mut begin = vec![0_u32; nodes + 1];
-        let faces = || (0..4 * tets.len() as u32).map(|id| (id, key(face(tets, id))));
-        faces().for_each(|(_, key)| begin[key[0] as usize + 1] += 1);
+        ids().for_each(|id| begin[smallest(id) + 1] += 1);
         (0..nodes).for_each(|n| begin[n + 1] += begin[n]);
-        let mut ids = vec![0; 4 * tets.len()];
+        let mut sorted = vec![0; faces * elements.len()];
         let mut next = begin.clone();
-        for (id, [node, ..]) in faces() {
-            ids[next[node as usize] as usize] = id;
-            next[node as usize] += 1;
+        for id in ids() {
+            let next = &mut next[smallest(id)];
+            sorted[*next as usize] = id;
+            *next += 1;
         }
 
-        let mut neighbours = Self { behind: vec![[OUTSIDE; 4]; tets.len()], overlapping: 0 };
+        let mut neighbours = Self { faces, behind: vec![OUTSIDE; sorted.len()], overlapping: 0 };
         let mut bucket = Vec::new();
         for range in begin.windows(2) {
             bucket.clear();
-            bucket.extend(ids[range[0] as usize..range[1] as usize].iter().map(|&id| (key(face(tets, id)), id)));
+            let ascending = |id| {
+                let mut corners = corners(id);
+                corners.sort_unstable();
+                corners
+            };
+            bucket.extend(sorted[range[0] as usize..range[1] as usize].iter().map(|&id| (ascending(id), id)));
             bucket.sort_unstable();
             for same in bucket.chunk_by(|a, b| a.0 == b.0) {
                 match *same {
                     [_] => {}
-                    [(_, a), (_, b)] if turns(face(tets, a)) != turns(face(tets, b)) => {
-                        neighbours.behind[a as usize / 4][a as usize % 4] = b / 4;
-                        neighbours.behind[b as usize / 4][b as usize % 4] = a / 4;
+                    [(_, a), (_, b)] if turns(&corners(a)) != turns(&corners(b)) => {
+                        neighbours.behind[a as usize] = b / faces as u32;
+                        neighbours.behind[b as usize] = a / faces as u32;
                     }
                     _ => neighbours.overlapping += 1,
                 }
@@ -51,73 +74,83 @@ impl Neighbours {
         neighbours
     }
 
-    /// Faces that belong to one tetrahedron only, counter-clockwise from outside, in the order of the tetrahedra.
-    pub fn outer<'a>(&'a self, tets: &'a [[u32; 4]]) -> impl Iterator<Item = [u32; 3]> + 'a {
-        (0..4 * tets.len() as u32).filter(|&id| self.behind(id) == OUTSIDE).map(|id| face(tets, id))
+    /// Elements behind the faces of one.
+    pub fn behind(&self, element: usize) -> &[u32] {
+        &self.behind[self.faces * element..self.faces * (element + 1)]
     }
 
-    /// Faces between two tetrahedra, once each.
-    pub fn inner<'a>(&'a self, tets: &'a [[u32; 4]]) -> impl Iterator<Item = [u32; 3]> + 'a {
-        let first = |id: &u32| self.behind(*id) != OUTSIDE && id / 4 < self.behind(*id);
-        (0..4 * tets.len() as u32).filter(first).map(|id| face(tets, id))
+    /// Elements that share a face with one.
+    pub fn of(&self, element: usize) -> impl Iterator<Item = u32> {
+        self.behind(element).iter().copied().filter(|&other| other != OUTSIDE)
     }
 
-    fn behind(&self, id: u32) -> u32 {
-        self.behind[id as usize / 4][id as usize % 4]
+    /// Nodes of the faces that belong to one element only, counter-clockwise from outside, in the order of the elements.
+    pub fn outer<'a>(&'a self, elements: &'a Elements) -> impl Iterator<Item = Vec<u32>> + 'a {
+        (0..self.behind.len()).filter(|&id| self.behind[id] == OUTSIDE).map(|id| self.face(elements, id))
+    }
+
+    /// Nodes of the faces between two elements, once each.
+    pub fn inner<'a>(&'a self, elements: &'a Elements) -> impl Iterator<Item = Vec<u32>> + 'a {
+        let first = |id: &usize| self.behind[*id] != OUTSIDE && id / self.faces < self.behind[*id] as usize;
+        (0..self.behind.len()).filter(first).map(|id| self.face(elements, id))
+    }
+
+    fn face(&self, elements: &Elements, id: usize) -> Vec<u32> {
+        elements.face(id / self.faces, id % self.faces)
     }
 }
 
-/// A face in ascending order of its nodes.
-pub fn key(mut face: [u32; 3]) -> [u32; 3] {
-    face.sort_unstable();
-    face
+/// What identifies a face, whatever its first node and sense.
+pub fn key(face: &[u32]) -> Vec<u32> {
+    let mut nodes = face.to_vec();
+    nodes.sort_unstable();
+    nodes
 }
 
-/// Whether the nodes of a face are an odd permutation of their ascending order.
-fn turns([a, b, c]: [u32; 3]) -> bool {
-    (a > b) ^ (b > c) ^ (a > c)
-}
-
-/// Face number `id`: four a tetrahedron.
-fn face(tets: &[[u32; 4]], id: u32) -> [u32; 3] {
-    TET_FACES[id as usize % 4].map(|corner| tets[id as usize / 4][corner])
+/// Which way a face turns: the same for every first corner, opposite on its other side.
+fn turns<const C: usize>(corners: &[u32; C]) -> bool {
+    let first = (0..C).min_by_key(|&k| corners[k]).expect("a face has corners");
+    corners[(first + 1) % C] > corners[(first + C - 1) % C]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::Kind;
     use crate::mesh::{Brick, Face, brick};
 
-    fn tets(brick: &Brick) -> Vec<[u32; 4]> {
-        brick::indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell)).map(|tet| tet.map(|n| n as u32)).collect()
+    fn tets(nodes: &[[u32; 4]]) -> Elements {
+        Elements::new(Kind::Tet4, nodes.concat())
     }
 
     #[test]
     fn the_outside_of_a_brick_are_its_faces_and_neighbours_share_three_nodes() {
         let brick = Brick { origin: [0.0; 3], size: [1.0; 3], cells: [3, 2, 2] };
-        let tets = tets(&brick);
-        let neighbours = Neighbours::new(brick.node_count() as usize, &tets);
+        let nodes = brick::indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell)).flatten();
+        let elements = Elements::new(Kind::Tet4, nodes.map(|n| n as u32).collect());
+        let neighbours = Neighbours::new(brick.node_count() as usize, &elements);
         assert_eq!(neighbours.overlapping, 0);
         let turned = |t: [u32; 3]| (0..3).map(|k| [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]).min();
-        let mut outer: Vec<_> = neighbours.outer(&tets).map(turned).collect();
+        let mut outer: Vec<_> = neighbours.outer(&elements).map(|face| turned(face.try_into().unwrap())).collect();
         let of_brick = Face::ALL.into_iter().flat_map(|face| brick.triangles_on(face).collect::<Vec<_>>());
         let mut expected: Vec<_> = of_brick.map(|t| turned(t.map(|n| n as u32))).collect();
         outer.sort();
         expected.sort();
         assert_eq!(outer, expected, "sense of rotation included");
-        for (tet, behind) in neighbours.behind.iter().enumerate() {
-            for other in behind.iter().filter(|&&o| o != OUTSIDE).map(|&o| o as usize) {
-                assert_eq!(tets[tet].iter().filter(|n| tets[other].contains(n)).count(), 3);
-                assert!(neighbours.behind[other].contains(&(tet as u32)));
+        let tets = elements.of::<4>();
+        for (tet, nodes) in tets.iter().enumerate() {
+            for other in neighbours.of(tet).map(|o| o as usize) {
+                assert_eq!(nodes.iter().filter(|n| tets[other].contains(n)).count(), 3);
+                assert!(neighbours.behind(other).contains(&(tet as u32)));
             }
         }
     }
 
     #[test]
     fn an_edge_is_no_face_and_faces_with_two_elements_on_a_side_overlap() {
-        let count = |tets: &[[u32; 4]]| {
-            let neighbours = Neighbours::new(6, tets);
-            (neighbours.overlapping, neighbours.behind.as_flattened().iter().filter(|&&o| o != OUTSIDE).count())
+        let count = |nodes: &[[u32; 4]]| {
+            let neighbours = Neighbours::new(6, &tets(nodes));
+            (neighbours.overlapping, (0..nodes.len()).flat_map(|tet| neighbours.of(tet)).count())
         };
         assert_eq!(count(&[[0, 1, 2, 3], [0, 1, 4, 5]]), (0, 0));
         assert_eq!(count(&[[0, 1, 2, 3], [0, 2, 1, 4]]), (0, 2));

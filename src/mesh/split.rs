@@ -46,7 +46,8 @@ pub fn triangles(corners: &[u32], mut give: impl FnMut([u32; 3])) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::Tet4;
+    use crate::element::{Kind, tet4};
+    use crate::mesh::Elements;
     use crate::mesh::faces::{Neighbours, key};
     use crate::random::Random;
 
@@ -83,17 +84,19 @@ mod tests {
                 let place = |n: u32| points[numbers.iter().position(|&m| m == n).unwrap()];
                 let mut tets = Vec::new();
                 tetrahedra(&numbers, |tet| tets.push(tet));
-                let total: f64 = tets.iter().map(|tet| Tet4::new(&tet.map(place)).expect("positive").volume).sum();
+                let volume_of = |tet: &[u32; 4]| tet4::points(&tet.map(place)).expect("positive")[0].weight;
+                let total: f64 = tets.iter().map(volume_of).sum();
                 assert!((total - volume).abs() < 1e-14);
                 assert_eq!(tets.len(), count);
 
+                let tets = Elements::new(Kind::Tet4, tets.concat());
                 let neighbours = Neighbours::new(100, &tets);
                 assert_eq!(neighbours.overlapping, 0);
-                let mut outer: Vec<_> = neighbours.outer(&tets).map(key).collect();
+                let mut outer: Vec<_> = neighbours.outer(&tets).map(|face| key(&face)).collect();
                 let mut expected = Vec::new();
                 for face in faces {
                     let corners: Vec<u32> = face.iter().map(|&c| numbers[c]).collect();
-                    triangles(&corners, |t| expected.push(key(t)));
+                    triangles(&corners, |t| expected.push(key(&t)));
                 }
                 outer.sort();
                 expected.sort();

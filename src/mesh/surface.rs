@@ -1,7 +1,7 @@
-//! Flat boundary triangles: area, outward normal, and the nodal forces of a constant traction.
+//! Boundary faces: areas and normals, shared out to their nodes as the shape functions do.
 //!
-//! Corners turn counterclockwise seen from outside. Linear shape functions integrate to a third of the area each, so a
-//! traction t gives t area / 3 to every corner; that is exact for constant tractions only.
+//! Corners turn counter-clockwise seen from outside. Linear shape functions of a triangle integrate to a third of the area
+//! each, which is exact for constant tractions only.
 
 /// Half the cross product of two edges: area times unit normal.
 pub fn area_vector(corners: &[[f64; 3]; 3]) -> [f64; 3] {
@@ -21,13 +21,20 @@ pub fn normal(corners: &[[f64; 3]; 3]) -> Option<[f64; 3]> {
     (area > 0.0).then(|| vector.map(|c| c / area))
 }
 
-/// Force on each of the three corners under a constant traction (force per area).
-pub fn corner_force(corners: &[[f64; 3]; 3], traction: &[f64; 3]) -> [f64; 3] {
-    let third = area(corners) / 3.0;
-    traction.map(|t| third * t)
+/// Integral of each node's shape function over a face, times its direction if the face is flat (area): what a unit
+/// pressure inwards takes from the nodes.
+///
+/// # Panics
+/// If no face has so many nodes.
+pub fn shares(face: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    match *face {
+        [a, b, c] => vec![area_vector(&[a, b, c]).map(|x| x / 3.0); 3],
+        _ => panic!("no face has {} nodes", face.len()),
+    }
 }
 
-fn length(v: &[f64; 3]) -> f64 {
+/// Length of a vector.
+pub fn length(v: &[f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
@@ -40,7 +47,7 @@ mod tests {
         let corners = [[1.0, 1.0, 2.0], [3.0, 1.0, 2.0], [1.0, 4.0, 2.0]];
         assert_eq!(area(&corners), 3.0);
         assert_eq!(normal(&corners), Some([0.0, 0.0, 1.0]));
-        assert_eq!(corner_force(&corners, &[0.0, 6.0, -150.0]), [0.0, 6.0, -150.0]);
+        assert_eq!(shares(&corners), [[0.0, 0.0, 1.0]; 3]);
         assert_eq!(normal(&[[1.0; 3]; 3]), None);
     }
 }

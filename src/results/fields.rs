@@ -4,12 +4,16 @@ use super::piece::{Field, Piece};
 use crate::assembly::internal;
 use crate::contact::ContactPair;
 use crate::decomposition::Subdomain;
+use crate::element::Kind;
 use crate::feti::Torn;
 use crate::newton::TornProblem;
-use crate::tensor;
 
-/// VTK's number of a linear tetrahedron.
-const VTK_TETRA: u8 = 10;
+/// VTK's number of a kind of cell.
+fn vtk_type(kind: Kind) -> u8 {
+    match kind {
+        Kind::Tet4 => 10,
+    }
+}
 
 /// Contact at one pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,9 +34,9 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
         let first = piece.points.len() as u64;
         piece.points.extend(&subdomain.points);
         for nodes in &subdomain.elements {
-            piece.connectivity.extend(nodes.map(|n| first + u64::from(n)));
+            piece.connectivity.extend(nodes.iter().map(|&n| first + u64::from(n)));
             piece.offsets.push(piece.connectivity.len() as u64);
-            piece.types.push(VTK_TETRA);
+            piece.types.push(vtk_type(subdomain.elements.kind()));
             subdomain_ids.push(subdomain.id as i64);
             bodies.push(subdomain.body as i64);
         }
@@ -82,7 +86,7 @@ pub fn largest_von_mises(problem: &TornProblem, u: &Torn) -> f64 {
 fn element_states<'a>(problem: &'a TornProblem<'_>, u: &'a Torn) -> impl Iterator<Item = (f64, f64)> + use<'a> {
     problem.subdomains.iter().zip(u).enumerate().flat_map(|(own, (subdomain, u))| {
         let (material, history) = (&problem.materials[own], problem.committed.history(own));
-        internal::responses(subdomain, material, history, u).map(|r| (tensor::von_mises(&r.stress), r.kappa))
+        internal::answers(subdomain, material, history, u).into_iter().map(|answer| (answer.von_mises, answer.kappa))
     })
 }
 

@@ -60,7 +60,7 @@ pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError
 /// # Errors
 /// As there.
 pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm) -> Result<Discrete, StudyError> {
-    let Meshes { bodies, tets, warnings } = Meshes::new(scene, comm)?;
+    let Meshes { bodies, solids, warnings } = Meshes::new(scene, comm)?;
     let materials = scene.body.values().map(|b| material(&scene.material[&b.material])).collect();
     let number =
         |name: &str| scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies");
@@ -78,9 +78,9 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     let index = |name: &SurfaceName| surfaces.binary_search(&surface(name)).expect("every named surface is listed");
     let touching: Vec<usize> = scene.contact.values().flat_map(scene::Contact::surfaces).map(index).collect();
 
-    let torn = Bodies { bodies: &bodies, meshes: &tets, surfaces: &surfaces, contact: &touching };
+    let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &surfaces, contact: &touching };
     let decomposition = decomposition::tear(&torn, cut(&scene.decomposition, &bodies), costs, comm);
-    drop(tets);
+    drop(solids);
     let reading_mb = reading_mb(&bodies, comm);
 
     let supports: Vec<Support> = scene

@@ -1,4 +1,4 @@
-//! Physical surfaces as triangles on the boundary of a volume.
+//! Physical surfaces as faces on the boundary of a volume.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -6,8 +6,8 @@ use super::Msh;
 use super::error::Problem;
 use super::volume::{higher_order, listed};
 use crate::mesh::faces::{Neighbours, key};
+use crate::mesh::solid::{NamedSurface, SolidMesh};
 use crate::mesh::split;
-use crate::mesh::tets::{NamedSurface, TetMesh};
 
 /// The boundary of a volume, and the file that names parts of it.
 pub(super) struct Boundary<'a> {
@@ -15,7 +15,7 @@ pub(super) struct Boundary<'a> {
     /// Name of the volume.
     pub volume: &'a str,
     /// Its elements.
-    pub mesh: &'a TetMesh,
+    pub mesh: &'a SolidMesh,
     pub neighbours: &'a Neighbours,
     /// From the file's nodes to the mesh's; `u32::MAX` for nodes of other volumes.
     pub index: &'a [u32],
@@ -23,9 +23,9 @@ pub(super) struct Boundary<'a> {
 
 /// What a physical surface has.
 struct Surface {
-    /// Triangles whose nodes are all in the volume, with ascending nodes.
-    triangles: Vec<[u32; 3]>,
-    /// All triangles.
+    /// Faces whose nodes are all in the volume, with ascending nodes.
+    faces: Vec<Vec<u32>>,
+    /// All faces.
     all: u64,
 }
 
@@ -37,24 +37,24 @@ impl Boundary<'_> {
     /// If a surface is missing, lies elsewhere, or inside the volume.
     pub fn surfaces(&self, names: &[&str]) -> Result<Vec<NamedSurface>, Problem> {
         let wanted = names.iter().map(|name| self.wanted(name)).collect::<Result<Vec<_>, _>>()?;
-        let mut of_triangle: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
-        for (surface, Surface { triangles, .. }) in wanted.iter().enumerate() {
-            for &triangle in triangles {
-                let surfaces = of_triangle.entry(triangle).or_default();
-                // A file may have the same triangle several times.
+        let mut of_face: HashMap<&[u32], Vec<usize>> = HashMap::new();
+        for (surface, Surface { faces, .. }) in wanted.iter().enumerate() {
+            for face in faces {
+                let surfaces = of_face.entry(face).or_default();
+                // A file may have the same face several times.
                 if surfaces.last() != Some(&surface) {
                     surfaces.push(surface);
                 }
             }
         }
-        let surfaces_of = |face: &[u32; 3]| of_triangle.get(&key(*face)).into_iter().flatten().copied();
-        let empty = |name: &&str| NamedSurface { name: name.to_string(), triangles: Vec::new() };
+        let surfaces_of = |face: &[u32]| of_face.get(&key(face)[..]).into_iter().flatten().copied();
+        let empty = |name: &&str| NamedSurface { name: name.to_string(), faces: Vec::new() };
         let mut result: Vec<_> = names.iter().map(empty).collect();
-        for face in self.neighbours.outer(&self.mesh.tets) {
-            surfaces_of(&face).for_each(|surface| result[surface].triangles.push(face));
+        for face in self.neighbours.outer(&self.mesh.elements) {
+            surfaces_of(&face).for_each(|surface| result[surface].faces.push(face.clone()));
         }
         let mut inner = vec![0; names.len()];
-        let inner_faces = self.neighbours.inner(&self.mesh.tets);
+        let inner_faces = self.neighbours.inner(&self.mesh.elements);
         inner_faces.flat_map(|face| surfaces_of(&face)).for_each(|surface| inner[surface] += 1);
 
         let volume = || self.volume.to_owned();
@@ -63,7 +63,7 @@ impl Boundary<'_> {
             if inner > 0 {
                 return Err(Problem::InnerSurface { name, volume: volume(), inner, triangles });
             }
-            if found.triangles.is_empty() {
+            if found.faces.is_empty() {
                 return Err(Problem::ElsewhereSurface { name, triangles, volume: volume(), known: self.known() });
             }
         }
@@ -80,7 +80,7 @@ impl Boundary<'_> {
     }
 
     fn surface(&self, name: &str) -> Result<Surface, Problem> {
-        let mut surface = Surface { triangles: Vec::new(), all: 0 };
+        let mut surface = Surface { faces: Vec::new(), all: 0 };
         for block in self.msh.group(2, name) {
             if !block.kind.linear {
                 return Err(higher_order(format!("surface `{name}`"), self.msh.group(2, name)));
@@ -90,7 +90,7 @@ impl Boundary<'_> {
                     surface.all += 1;
                     let local = triangle.map(|n| self.index[n as usize]);
                     if !local.contains(&u32::MAX) {
-                        surface.triangles.push(key(local));
+                        surface.faces.push(key(&local));
                     }
                 });
             }
@@ -100,11 +100,11 @@ impl Boundary<'_> {
 
     /// Physical surfaces with triangles on the boundary.
     fn known(&self) -> String {
-        let outer: HashSet<_> = self.neighbours.outer(&self.mesh.tets).map(key).collect();
+        let outer: HashSet<_> = self.neighbours.outer(&self.mesh.elements).map(|face| key(&face)).collect();
         let mut known = BTreeMap::new();
         for name in self.msh.group_names(2).into_keys() {
-            let triangles = self.surface(&name).map_or(Vec::new(), |surface| surface.triangles);
-            let count = triangles.iter().filter(|t| outer.contains(*t)).count() as u64;
+            let faces = self.surface(&name).map_or(Vec::new(), |surface| surface.faces);
+            let count = faces.iter().filter(|face| outer.contains(*face)).count() as u64;
             if count > 0 {
                 known.insert(name, count);
             }

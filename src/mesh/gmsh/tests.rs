@@ -1,8 +1,8 @@
 //! Files that Gmsh wrote (tests/meshes/make.py), and what becomes of them when they are damaged.
 
 use super::*;
-use crate::element::Tet4;
-use crate::mesh::TetMesh;
+use crate::element::tet4;
+use crate::mesh::SolidMesh;
 use crate::mesh::surface::area_vector;
 
 const TEXT: &[u8] = include_bytes!("../../../tests/meshes/tets-41.msh");
@@ -16,15 +16,17 @@ fn parse(bytes: &[u8]) -> Result<Msh, Problem> {
     Msh::parse(bytes, bytes.len() as u64)
 }
 
-fn volume(mesh: &TetMesh) -> f64 {
-    mesh.tets.iter().map(|&tet| Tet4::new(&mesh.corners(tet)).expect("elements are checked").volume).sum()
+fn volume(mesh: &SolidMesh) -> f64 {
+    let place = |tet: &[u32; 4]| tet.map(|n| mesh.points[n as usize]);
+    mesh.elements.of().iter().map(|tet| tet4::points(&place(tet)).expect("elements are checked")[0].weight).sum()
 }
 
 /// Area times normal of a surface, and the number of its triangles.
-fn area(mesh: &TetMesh, surface: usize) -> ([f64; 3], usize) {
-    let triangles = &mesh.surfaces[surface].triangles;
-    let vectors = triangles.iter().map(|t| area_vector(&t.map(|n| mesh.points[n as usize])));
-    (vectors.fold([0.0; 3], |sum, v| std::array::from_fn(|a| sum[a] + v[a])), triangles.len())
+fn area(mesh: &SolidMesh, surface: usize) -> ([f64; 3], usize) {
+    let faces = &mesh.surfaces[surface].faces;
+    let place = |face: &Vec<u32>| std::array::from_fn(|k| mesh.points[face[k] as usize]);
+    let vectors = faces.iter().map(|face| area_vector(&place(face)));
+    (vectors.fold([0.0; 3], |sum, v| std::array::from_fn(|a| sum[a] + v[a])), faces.len())
 }
 
 #[track_caller]
@@ -35,9 +37,9 @@ fn assert_area(found: ([f64; 3], usize), area: [f64; 3], triangles: usize) {
 
 /// Equal but for the last digit of coordinates.
 #[track_caller]
-fn assert_same(found: &[TetMesh], expected: &[TetMesh]) {
+fn assert_same(found: &[SolidMesh], expected: &[SolidMesh]) {
     for (found, expected) in found.iter().zip(expected) {
-        assert!((&found.tets, &found.surfaces) == (&expected.tets, &expected.surfaces));
+        assert!((&found.elements, &found.surfaces) == (&expected.elements, &expected.surfaces));
         let pairs = found.points.as_flattened().iter().zip(expected.points.as_flattened());
         assert!(
             found.points.len() == expected.points.len()
@@ -54,7 +56,7 @@ fn every_format_gives_the_same_bodies() {
         (block, msh.volume(Some("the rod"), &["both sides", "9"]).unwrap())
     };
     let (block, rod) = of(TEXT);
-    assert_eq!((block.cells, rod.cells, rod.tets.len()), (90, 42, 42));
+    assert_eq!((block.cells, rod.cells, rod.elements.len()), (90, 42, 42));
     assert!((volume(&block) - 2.0).abs() < 1e-13 && (volume(&rod) - 0.25).abs() < 1e-13);
     assert_area(area(&block, 0), [0.0, 0.0, -2.0], 14);
     assert_area(area(&block, 1), [0.0, 0.0, 2.0], 14);
@@ -67,7 +69,7 @@ fn every_format_gives_the_same_bodies() {
     // Version 2 orders nodes and cells in its own way.
     let (block_2, rod_2) = of(TEXT_2);
     assert_same(&[of(BINARY_2).0, of(BINARY_2).1], &[block_2.clone(), rod_2.clone()]);
-    assert_eq!((block_2.tets.len(), rod_2.tets.len()), (90, 42));
+    assert_eq!((block_2.elements.len(), rod_2.elements.len()), (90, 42));
     assert!((volume(&block_2) - 2.0).abs() < 1e-13);
     assert_area(area(&block_2, 1), [0.0, 0.0, 2.0], 14);
 }
@@ -75,11 +77,11 @@ fn every_format_gives_the_same_bodies() {
 #[test]
 fn hexahedra_and_prisms_are_split_alike_on_both_sides_of_their_faces() {
     let mesh = parse(HEXAHEDRA).unwrap().volume(None, &["base", "top"]).unwrap();
-    assert_eq!((mesh.cells, mesh.tets.len()), (81, 27 * 6 + 54 * 3));
+    assert_eq!((mesh.cells, mesh.elements.len()), (81, 27 * 6 + 54 * 3));
     assert!((volume(&mesh) - 2.0).abs() < 1e-13);
     assert_area(area(&mesh, 0), [0.0, 0.0, -2.0], 18 + 18);
     assert_area(area(&mesh, 1), [0.0, 0.0, 2.0], 18 + 18);
-    let outer = crate::mesh::faces::Neighbours::new(mesh.points.len(), &mesh.tets).outer(&mesh.tets).count();
+    let outer = crate::mesh::faces::Neighbours::new(mesh.points.len(), &mesh.elements).outer(&mesh.elements).count();
     // Quadrangles: 9 at the end of the hexahedra, 9 at that of the prisms, 18 on each long side.
     assert_eq!(outer, 2 * (9 + 9 + 2 * 18) + 2 * 36);
 }

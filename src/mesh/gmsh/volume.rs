@@ -5,17 +5,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::error::Problem;
 use super::surface::Boundary;
 use super::{Block, Msh};
+use crate::element::Kind;
 use crate::mesh::faces::Neighbours;
 use crate::mesh::quality::Quality;
-use crate::mesh::split;
-use crate::mesh::tets::TetMesh;
+use crate::mesh::{Elements, SolidMesh, split};
 
 impl Msh {
     /// The physical volume of this name (or number, if it has no name), or the only one there is, with these surfaces.
     ///
     /// # Errors
     /// If the volume or one of the surfaces is missing, or elements cannot be computed with.
-    pub fn volume(&self, volume: Option<&str>, surfaces: &[&str]) -> Result<TetMesh, Problem> {
+    pub fn volume(&self, volume: Option<&str>, surfaces: &[&str]) -> Result<SolidMesh, Problem> {
         self.refuse_untagged()?;
         let volume = &self.choose(volume)?;
         let mut blocks = Vec::new();
@@ -28,24 +28,28 @@ impl Msh {
 
         let mut index = vec![u32::MAX; self.points.len()];
         blocks.iter().flat_map(|b| &b.nodes).for_each(|&n| index[n as usize] = 0);
-        let mut mesh = TetMesh { cells: blocks.iter().map(|b| b.cells).sum(), ..TetMesh::default() };
+        let mut points = Vec::new();
         for (index, point) in index.iter_mut().zip(&self.points).filter(|(index, _)| **index == 0) {
-            *index = mesh.points.len() as u32;
-            mesh.points.push(*point);
+            *index = points.len() as u32;
+            points.push(*point);
         }
+        let mut nodes = Vec::new();
         // Both sides of a face are cut alike because nodes keep their order.
         for block in &blocks {
             for cell in block.nodes.chunks_exact(block.kind.nodes) {
-                split::tetrahedra(cell, |tet| mesh.tets.push(tet.map(|n| index[n as usize])));
+                split::tetrahedra(cell, |tet| nodes.extend(tet.map(|n| index[n as usize])));
             }
         }
-        if mesh.tets.len() >= MOST_ELEMENTS {
+        let elements = Elements::new(Kind::Tet4, nodes);
+        if elements.len() >= MOST_ELEMENTS {
             let limit = format!("the {MOST_ELEMENTS} that a graph of METIS can have");
-            let announced = mesh.tets.len() as u64;
+            let announced = elements.len() as u64;
             return Err(Problem::TooMany { section: "Elements", items: "tetrahedra", announced, limit });
         }
+        let cells = blocks.iter().map(|b| b.cells).sum();
+        let mut mesh = SolidMesh { points, elements, cells, surfaces: Vec::new() };
         check_elements(volume, &mesh)?;
-        let neighbours = Neighbours::new(mesh.points.len(), &mesh.tets);
+        let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
         if neighbours.overlapping > 0 {
             return Err(Problem::Overlapping { volume: volume.clone(), faces: neighbours.overlapping });
         }
@@ -113,14 +117,9 @@ impl Msh {
 }
 
 /// Refuses elements without a positive volume.
-fn check_elements(volume: &str, mesh: &TetMesh) -> Result<(), Problem> {
-    let Quality { elements, inverted, degenerate, .. } = Quality::of(mesh.tets.iter().map(|&tet| mesh.corners(tet)));
-    if inverted + degenerate == 0 {
-        return Ok(());
-    }
-    let bad = |tet: &&[u32; 4]| !Quality::of([mesh.corners(**tet)]).is_sound();
-    let first = mesh.corners(*mesh.tets.iter().find(bad).expect("some are counted"));
-    let near = std::array::from_fn(|a| first.iter().map(|corner| corner[a] / 4.0).sum());
+fn check_elements(volume: &str, mesh: &SolidMesh) -> Result<(), Problem> {
+    let Quality { elements, inverted, degenerate, first, .. } = Quality::of(mesh);
+    let Some(near) = first else { return Ok(()) };
     let hint = if inverted == elements { ", or turn all cells inside out" } else { "" };
     Err(Problem::BadElements { volume: volume.to_owned(), elements, inverted, degenerate, near, hint })
 }

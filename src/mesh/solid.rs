@@ -1,0 +1,32 @@
+//! An unstructured mesh of one body, with named surfaces.
+
+use super::Elements;
+
+/// The mesh of one body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolidMesh {
+    /// Coordinates of the nodes.
+    pub points: Vec<[f64; 3]>,
+    /// Elements, positively oriented.
+    pub elements: Elements,
+    /// Cells of the file, before they were split into elements.
+    pub cells: u64,
+    /// Parts of the boundary; a face may be on several.
+    pub surfaces: Vec<NamedSurface>,
+}
+
+/// Part of the boundary of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedSurface {
+    /// Its name.
+    pub name: String,
+    /// Nodes of its faces, counter-clockwise from outside.
+    pub faces: Vec<Vec<u32>>,
+}
+
+impl SolidMesh {
+    /// Faces of a named surface; none if there is no such surface.
+    pub fn surface(&self, name: &str) -> &[Vec<u32>] {
+        self.surfaces.iter().find(|surface| surface.name == name).map_or(&[], |surface| &surface.faces)
+    }
+}
