@@ -81,6 +81,7 @@ pub fn bricks(scene: &Scene) -> Option<Vec<BodyMesh>> {
 fn kind(element: scene::Element) -> Kind {
     match element {
         scene::Element::Tet4 => Kind::Tet4,
+        scene::Element::Hex8 => Kind::Hex8,
     }
 }
 
@@ -100,13 +101,19 @@ struct FromFile<'a> {
     index: usize,
     name: &'a String,
     gmsh: &'a Gmsh,
+    kind: Kind,
 }
 
 fn read(scene: &Scene) -> Result<Found, MeshError> {
     let mut files: BTreeMap<PathBuf, Vec<FromFile>> = BTreeMap::new();
     for (index, (name, body)) in scene.body.iter().enumerate() {
         if let Some(gmsh) = body.gmsh() {
-            files.entry(scene.directory.join(&gmsh.file)).or_default().push(FromFile { index, name, gmsh });
+            files.entry(scene.directory.join(&gmsh.file)).or_default().push(FromFile {
+                index,
+                name,
+                gmsh,
+                kind: kind(body.element),
+            });
         }
     }
     let mut found = Found::default();
@@ -115,10 +122,10 @@ fn read(scene: &Scene) -> Result<Found, MeshError> {
             let text = format!("{}: {problem}", path.display());
             if matches!(problem, Problem::Read(_)) { MeshError::Unreadable(text) } else { MeshError::Bad(text) }
         })?;
-        for FromFile { index, name, gmsh } in bodies {
+        for FromFile { index, name, gmsh, kind } in bodies {
             let surfaces: Vec<&str> = surfaces_of(scene, name).into_iter().collect();
             let problem = |problem: Problem| MeshError::Bad(format!("body.{name}: {}: {problem}", path.display()));
-            let mut mesh = msh.volume(gmsh.volume.as_deref(), &surfaces).map_err(problem)?;
+            let mut mesh = msh.volume(gmsh.volume.as_deref(), &surfaces, *kind).map_err(problem)?;
             place(gmsh, &mut mesh);
             found.warnings.extend(check(scene, name, &mesh)?);
             found.solids.insert(*index, mesh);

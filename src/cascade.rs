@@ -24,33 +24,37 @@ pub fn interpolate(
 ) -> Torn {
     let (coarse_bodies, coarse_subdomains, u) = coarse;
     let (fine_bodies, fine_subdomains) = fine;
-    let around: Vec<Vec<([u64; 4], [f64; 4])>> = fine_subdomains
+    let around: Vec<Vec<(Vec<u64>, Vec<f64>)>> = fine_subdomains
         .iter()
         .map(|s| s.nodes.iter().map(|&node| locate(&coarse_bodies[s.body], &fine_bodies[s.body], node)).collect())
         .collect();
-    let needed = around.iter().flatten().flat_map(|(nodes, _)| *nodes).collect();
+    let needed = around.iter().flatten().flat_map(|(nodes, _)| nodes.iter().copied()).collect();
     let values = fetch(comm, coarse_subdomains, u, needed);
     around
         .iter()
-        .map(|nodes| nodes.iter().flat_map(|(corners, weights)| mean(&values, corners, weights)).collect())
+        .map(|nodes| nodes.iter().flat_map(|(nodes, weights)| mean(&values, nodes, weights)).collect())
         .collect()
 }
 
-/// The coarse element around a fine node: its nodes, numbered over all bodies, and the values of their linear functions.
-fn locate(coarse: &BodyMesh, fine: &BodyMesh, node: u64) -> ([u64; 4], [f64; 4]) {
-    let bricks = [coarse, fine].map(brick);
-    let at = bricks[1].node_position(node - fine.first_node);
-    let in_cells = std::array::from_fn(|a| (at[a] * bricks[0].cells[a]) as f64 / bricks[1].cells[a] as f64);
-    let (nodes, weights) = bricks[0].around(in_cells);
-    (nodes.map(|n| coarse.first_node + n), weights)
+/// The coarse element around a fine node: its nodes, numbered over all bodies, and the values of their shape functions.
+fn locate(coarse: &BodyMesh, fine: &BodyMesh, node: u64) -> (Vec<u64>, Vec<f64>) {
+    let (cells, lattice) = (brick(coarse).cells, lattice(fine));
+    let at = lattice.node_position(node - fine.first_node);
+    let in_cells = std::array::from_fn(|a| (at[a] * cells[a]) as f64 / lattice.cells[a] as f64);
+    let (nodes, weights) = coarse.around(in_cells);
+    (nodes.iter().map(|n| coarse.first_node + n).collect(), weights)
+}
+
+fn lattice(body: &BodyMesh) -> Brick {
+    body.lattice().expect("only bricks have levels")
 }
 
 fn brick(body: &BodyMesh) -> &Brick {
     body.brick().expect("only bricks have levels")
 }
 
-fn mean(values: &HashMap<u64, [f64; 3]>, corners: &[u64; 4], weights: &[f64; 4]) -> [f64; 3] {
-    std::array::from_fn(|a| corners.iter().zip(weights).map(|(corner, w)| w * values[corner][a]).sum())
+fn mean(values: &HashMap<u64, [f64; 3]>, nodes: &[u64], weights: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|a| nodes.iter().zip(weights).map(|(node, w)| w * values[node][a]).sum())
 }
 
 /// Displacements of some coarse nodes, wherever they are. Of several copies that of the lowest subdomain counts.
@@ -94,11 +98,11 @@ pub fn closed_contacts(
         .collect();
     let nearest = |node: u64| {
         let body = fine_bodies.iter().rposition(|body| body.first_node <= node).expect("a node is in a body");
-        let (fine, coarse) = (&fine_bodies[body], &coarse_bodies[body]);
-        let at = brick(fine).node_position(node - fine.first_node);
-        let cells = (brick(fine).cells, brick(coarse).cells);
-        let place = std::array::from_fn(|a| (2 * at[a] * cells.1[a] + cells.0[a]) / (2 * cells.0[a]));
-        coarse.first_node + brick(coarse).node(place)
+        let (first, coarse_first) = (fine_bodies[body].first_node, coarse_bodies[body].first_node);
+        let (fine, coarse) = (lattice(&fine_bodies[body]), lattice(&coarse_bodies[body]));
+        let at = fine.node_position(node - first);
+        let place = std::array::from_fn(|a| (2 * at[a] * coarse.cells[a] + fine.cells[a]) / (2 * fine.cells[a]));
+        coarse_first + coarse.node(place)
     };
     fine_pairs.iter().map(|pair| closed.contains(&(pair.contact, nearest(pair.slave)))).collect()
 }
@@ -168,9 +172,12 @@ mod tests {
 
     #[test]
     fn linear_displacements_pass_exactly() {
-        let (coarse, fine) = (discrete(&two_bricks(&[]), &Solo), discrete(&two_bricks(&FINER), &Solo));
-        for (found, exact) in pass(&Solo, &coarse, &fine, 0.0).iter().zip(field(&fine, 0.0)) {
-            assert!(found.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-13));
+        for element in ["body.upper.element=tet4", "body.upper.element=hex8"] {
+            let scenes = [two_bricks(&[element]), two_bricks(&[&FINER[..], &[element]].concat())];
+            let [coarse, fine] = scenes.map(|scene| discrete(&scene, &Solo));
+            for (found, exact) in pass(&Solo, &coarse, &fine, 0.0).iter().zip(field(&fine, 0.0)) {
+                assert!(found.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-13));
+            }
         }
     }
 

@@ -1,4 +1,4 @@
-//! Homogeneous states, which linear elements hold exactly on any mesh: uniaxial tension, pure shear, and two blocks in
+//! Homogeneous states, which all elements hold exactly on any mesh: uniaxial tension, pure shear, and two blocks in
 //! contact, in several subdomains on 2 ranks. Expected values are closed forms: the tensor of strain is
 //! `sigma/E + kappa` along a uniaxial stress and `-nu sigma/E - kappa/2` across it, `kappa = (q - sigma_y)/H`.
 
@@ -64,9 +64,28 @@ fn a_bar_in_one_subdomain_or_many_stretches_the_same() {
     assert_bar(500.0, &["decomposition.subdomains=7"]);
 }
 
+/// Elements other than the default.
+const ELEMENTS: [&str; 1] = ["hex8"];
+
+#[test]
+fn a_bar_of_other_elements_stretches_the_same() {
+    for element in ELEMENTS {
+        let element = format!("body.bar.element={element}");
+        assert_bar(500.0, &[&element]);
+        assert_bar(400.0, &["load.pull.traction.0=400", &element, "decomposition.subdomains=7"]);
+    }
+}
+
 #[test]
 fn pure_shear_beyond_yield_is_the_closed_form() {
-    let run = tightly("shear", &[]);
+    assert_shear(&[]);
+    for element in ELEMENTS {
+        assert_shear(&[&format!("body.block.element={element}")]);
+    }
+}
+
+fn assert_shear(sets: &[&str]) {
+    let run = tightly("shear", sets);
     let fields = Fields::read(&run.result());
     let gamma = 1.574342794511e-2;
     assert_close("angle", 15.74342794511481 / 1000.0, gamma, 1e-12);
@@ -119,6 +138,20 @@ fn two_elastic_blocks_share_the_push() {
 #[test]
 fn two_yielding_blocks_share_the_push() {
     assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[]);
+}
+
+#[test]
+fn two_blocks_of_other_elements_share_the_push() {
+    for element in ELEMENTS {
+        let [lower, upper] = ["lower", "upper"].map(|body| format!("body.{body}.element={element}"));
+        assert_blocks(10.0, 1.0, 472.5, &[&lower, &upper]);
+        assert_blocks(3.0, 0.0, 315.0, &[&lower, &upper, "decomposition.subdomains=9"]);
+        // The same nodes, but other faces: a mortar contact. And nodes that do not match.
+        assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[&upper]);
+        assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[&lower]);
+        let other = ["body.lower.brick.cells=[6, 5, 2]", "decomposition.subdomains=8"];
+        assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[&other[..], &[&lower, &upper]].concat());
+    }
 }
 
 #[test]

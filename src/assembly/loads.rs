@@ -2,7 +2,7 @@
 
 use super::integrated;
 use crate::decomposition::Subdomain;
-use crate::element::{Kind, Nodal, Point, tet4};
+use crate::element::{Kind, Nodal, Point, hex8, tet4};
 use crate::mesh::surface;
 
 /// A uniform load on a named surface or in a body.
@@ -68,6 +68,7 @@ pub fn add(subdomain: &Subdomain, loads: &[Load], forces: &mut [f64]) {
             let mut give = |node: u32, volume: f64| give(node, value.map(|v| volume * v));
             match subdomain.elements.kind() {
                 Kind::Tet4 => share_volumes(tet4::points, &tet4::VALUES, subdomain, &mut give),
+                Kind::Hex8 => share_volumes(hex8::points, &hex8::values_at_points(), subdomain, &mut give),
             }
         }
     }

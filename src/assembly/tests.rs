@@ -1,5 +1,4 @@
-use super::loads;
-use super::{internal, stiffness};
+use super::{internal, loads, stiffness};
 use crate::assembly::pattern::Pattern;
 use crate::decomposition::Subdomain;
 use crate::fixture::{
@@ -12,10 +11,12 @@ use crate::random::Random;
 use crate::scene::Scene;
 
 /// A brick cut into boxes and into METIS parts, and a rod of one part.
-fn shapes() -> [Scene; 3] {
-    [
+fn shapes() -> Vec<Scene> {
+    vec![
         two_bricks(&[]),
         two_bricks_by_metis(7),
+        two_bricks(&["body.upper.element=hex8"]),
+        two_bricks(&["body.lower.element=hex8", "body.upper.element=hex8", "decomposition.subdomains=5"]),
         built_in("bar", &["body.bar.brick.cells=[40, 1, 1]", "decomposition.cells=[40, 1, 1]"]),
     ]
 }
@@ -203,7 +204,7 @@ fn half_yielding(subdomain: &Subdomain, u: &[f64]) -> Material {
 
 #[test]
 fn tractions_add_up_to_traction_times_area_on_any_cut_and_any_ranks() {
-    for scene in [two_bricks(&[]), two_bricks_by_metis(24)] {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(24), two_bricks(&["body.upper.element=hex8"])] {
         let nodal = same_on_any_ranks(&scene, |setup| {
             let forces = |subdomain: &Subdomain| {
                 let mut forces = vec![0.0; subdomain.dofs()];
@@ -217,6 +218,21 @@ fn tractions_add_up_to_traction_times_area_on_any_cut_and_any_ranks() {
             assert!((total - traction * 4.0 * 2.2).abs() < 1e-13);
         }
     }
+}
+
+#[test]
+fn each_quadrilateral_gives_a_quarter_of_its_force_to_each_corner() {
+    let cube =
+        built_in("bar", &["body.bar.element=hex8", "body.bar.brick.cells=[1, 1, 1]", "decomposition.cells=[1, 1, 1]"]);
+    on_ranks(&cube, 1, |setup| {
+        let subdomain = &setup.subdomains()[0];
+        let mut forces = vec![0.0; subdomain.dofs()];
+        loads::add(subdomain, &setup.discrete.loads, &mut forces);
+        let quarter = 500.0 * 500.0 * 500.0 / 4.0;
+        for (node, force) in forces.as_chunks::<3>().0.iter().enumerate() {
+            assert_eq!(*force, [if node % 2 == 1 { quarter } else { 0.0 }, 0.0, 0.0]);
+        }
+    });
 }
 
 #[test]

@@ -15,18 +15,8 @@ const TOLERANCE: f64 = 1e-6;
 /// has the other side opposite but none of its nodes, or if nodes match but triangles do not.
 pub fn pair(contact: usize, slave: &GatheredSurface, master: &GatheredSurface) -> Option<Vec<ContactPair>> {
     let opposite = opposite_nodes(slave, master)?;
-    opposite_nodes(master, slave)?;
-    let sorted = |mut triangle: [usize; 3]| {
-        triangle.sort_unstable();
-        triangle
-    };
-    let triangles: HashSet<[usize; 3]> = master.triangles.iter().copied().map(sorted).collect();
-    let partner = |node: usize| opposite[node].map(|(partner, _)| partner);
-    let differs = |&[a, b, c]: &[usize; 3]| match (partner(a), partner(b), partner(c)) {
-        (Some(a), Some(b), Some(c)) => !triangles.contains(&sorted([a, b, c])),
-        _ => false,
-    };
-    if slave.triangles.iter().any(differs) {
+    let back = opposite_nodes(master, slave)?;
+    if differ(slave, master, &opposite) || differ(master, slave, &back) {
         return None;
     }
     let found = opposite.into_iter().zip(slave.normals_and_areas()).zip(&slave.nodes);
@@ -36,6 +26,20 @@ pub fn pair(contact: usize, slave: &GatheredSurface, master: &GatheredSurface) -
         Some(ContactPair { contact, slave, others: Vec::new(), masters, normal, gap, area })
     });
     Some(pairs.collect())
+}
+
+/// Whether one surface has a triangle whose corners have opposite nodes that are no triangle of the other.
+fn differ(one: &GatheredSurface, other: &GatheredSurface, opposite: &[Option<(usize, f64)>]) -> bool {
+    let sorted = |mut triangle: [usize; 3]| {
+        triangle.sort_unstable();
+        triangle
+    };
+    let triangles: HashSet<[usize; 3]> = other.triangles.iter().copied().map(sorted).collect();
+    let partner = |node: usize| opposite[node].map(|(partner, _)| partner);
+    one.triangles.iter().any(|&[a, b, c]| match (partner(a), partner(b), partner(c)) {
+        (Some(a), Some(b), Some(c)) => !triangles.contains(&sorted([a, b, c])),
+        _ => false,
+    })
 }
 
 /// For each node of one surface the node of the other that is opposite, and its distance. `None` if only the surface is.
@@ -142,7 +146,12 @@ mod tests {
         }
         let h = size / n as f64;
         let points = (0..(n + 1) * (n + 1)).map(|k| [(k % (n + 1)) as f64 * h, (k / (n + 1)) as f64 * h, z]).collect();
-        GatheredSurface { nodes: (0..((n + 1) * (n + 1)) as u64).map(|k| first + k).collect(), points, triangles }
+        GatheredSurface {
+            nodes: (0..((n + 1) * (n + 1)) as u64).map(|k| first + k).collect(),
+            points,
+            triangles,
+            share: 1.0,
+        }
     }
 
     #[test]
@@ -157,6 +166,32 @@ mod tests {
             }
             assert!((pairs.iter().map(|p| p.area).sum::<f64>() - 1.0).abs() < 1e-14);
         }
+    }
+
+    /// Quadrilaterals, which are cut in both ways, match each other but not triangles.
+    #[test]
+    fn quadrilaterals_match_quadrilaterals_only() {
+        let cut_twice = |mut surface: GatheredSurface| {
+            let others: Vec<_> = surface
+                .triangles
+                .chunks_exact(2)
+                .flat_map(|pair| {
+                    // [a, b, c] and [a, c, d], turned around if it looks down.
+                    let [a, b, c] = pair[0];
+                    let d = pair[1].into_iter().find(|n| !pair[0].contains(n)).expect("it has a fourth corner");
+                    if b == a + 1 { [[a, b, d], [b, c, d]] } else { [[a, d, c], [c, d, b]] }
+                })
+                .collect();
+            surface.triangles.extend(others);
+            GatheredSurface { share: 0.5, ..surface }
+        };
+        let (up, down) = (square(4, 1.0, 0.0, true, 0), || square(4, 1.0, 0.3, false, 100));
+        assert_eq!(pair(0, &cut_twice(down()), &up), None);
+        assert_eq!(pair(0, &down(), &cut_twice(up)), None);
+        let pairs = pair(0, &cut_twice(down()), &cut_twice(square(4, 1.0, 0.0, true, 0))).expect("they match");
+        assert!((pairs.iter().map(|p| p.area).sum::<f64>() - 1.0).abs() < 1e-14);
+        let corner = pairs.iter().find(|p| p.slave == 100).expect("all nodes are paired");
+        assert!((corner.area - 1.0 / 64.0).abs() < 1e-15);
     }
 
     #[test]

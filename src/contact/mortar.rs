@@ -1,7 +1,7 @@
 //! Contact of surfaces whose nodes do not match: dual mortar conditions, integrated over the common refinement.
 //!
 //! Every slave triangle is cut by the master triangles projected onto its plane along its normal. On each piece the linear
-//! functions of both sides are linear, so three points integrate their products exactly. With the dual functions `psi_j` of
+//! functions of both sides are linear (quadrilaterals are cut in both ways, and count half each), so three points integrate their products exactly. With the dual functions `psi_j` of
 //! the slave nodes ([`super::dual`]), `D_jk = integral of psi_j phi_k` and `M_jl = integral of psi_j phi_l` over the master,
 //! the condition on slave node `j` with its unit normal `n_j` is
 //!
@@ -140,6 +140,8 @@ struct Opposite<'a> {
     normals: Vec<Option<[f64; 3]>>,
     tree: BallTree,
     deepest: f64,
+    /// How much a piece of a slave and a master triangle counts.
+    share: f64,
 }
 
 impl<'a> Opposite<'a> {
@@ -147,7 +149,8 @@ impl<'a> Opposite<'a> {
         let corners: Vec<_> = master.corners().collect();
         let normals = corners.iter().map(surface::normal).collect();
         let deepest = DEEPEST * slave.diameter().min(master.diameter());
-        Self { tree: BallTree::new(&corners), master, corners, normals, deepest }
+        let share = slave.share * master.share;
+        Self { tree: BallTree::new(&corners), master, corners, normals, deepest, share }
     }
 
     /// Points of integration on the part of a slave triangle that faces the master surface.
@@ -176,7 +179,12 @@ impl<'a> Opposite<'a> {
                 }
                 let at = |i: usize| {
                     let p = [0, 1].map(|x| 0.5 * (part[i][x] + part[(i + 1) % 3][x]));
-                    (area / 6.0, barycentric(&flat, p), self.master.triangles[index], barycentric(&[a, b, c], p))
+                    (
+                        self.share * area / 6.0,
+                        barycentric(&flat, p),
+                        self.master.triangles[index],
+                        barycentric(&[a, b, c], p),
+                    )
                 };
                 let piece = [0, 1, 2].map(at);
                 if piece.iter().all(|(_, _, _, values)| dot(*values, heights) >= -self.deepest) {

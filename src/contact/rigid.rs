@@ -192,6 +192,7 @@ mod tests {
             nodes: vec![4, 5, 6, 7],
             points: vec![[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 0.0]],
             triangles: vec![[0, 1, 2], [3, 2, 1]],
+            share: 1.0,
         };
         let wall = |x: f64, normal: f64| Obstacle::Plane { point: [x, 0.0, 0.0], normal: [normal, 0.0, 0.0] };
         let right = pair(2, "wall", &roof, &wall(3.0, -1.0)).expect("one slope faces it");

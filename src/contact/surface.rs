@@ -1,5 +1,7 @@
 //! A named surface, gathered from all subdomains.
 
+use std::collections::BTreeMap;
+
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Subdomain;
 use crate::mesh::surface::area_vector;
@@ -10,8 +12,11 @@ pub struct GatheredSurface {
     pub nodes: Vec<u64>,
     /// Their coordinates.
     pub points: Vec<[f64; 3]>,
-    /// Corners as indices into `nodes`, counter-clockwise from outside.
+    /// Corners as indices into `nodes`, counter-clockwise from outside. Quadrilaterals are cut in both ways, and integrals
+    /// are means of both: that keeps the integrals of bilinear functions, so constant pressures.
     pub triangles: Vec<[usize; 3]>,
+    /// How much a triangle counts: a half where quadrilaterals are cut in both ways, else one.
+    pub share: f64,
 }
 
 impl GatheredSurface {
@@ -20,22 +25,34 @@ impl GatheredSurface {
         let mut mine = Vec::new();
         for subdomain in subdomains {
             for facet in subdomain.facets.iter().filter(|f| f.surface == surface) {
+                mine.push(facet.nodes.len() as u64);
                 for node in facet.nodes.iter().map(|&n| n as usize) {
                     mine.push(subdomain.nodes[node]);
                     mine.extend(subdomain.points[node].map(f64::to_bits));
                 }
             }
         }
-        let all = all_gather_u64(comm, &mine);
-        let mut corners: Vec<(u64, [f64; 3])> =
-            all.chunks_exact(4).map(|c| (c[0], [1, 2, 3].map(|a| f64::from_bits(c[a])))).collect();
-        let order: Vec<u64> = corners.iter().map(|c| c.0).collect();
-        corners.sort_by_key(|c| c.0);
-        corners.dedup_by_key(|c| c.0);
-        let (nodes, points): (Vec<u64>, Vec<[f64; 3]>) = corners.into_iter().unzip();
-        let index = |node: &u64| nodes.binary_search(node).expect("every corner is listed");
-        let triangles = order.chunks_exact(3).map(|t| [index(&t[0]), index(&t[1]), index(&t[2])]).collect();
-        Self { nodes, points, triangles }
+        let (mut places, mut triangles, mut share) = (BTreeMap::new(), Vec::new(), 1.0);
+        let mut all = all_gather_u64(comm, &mine).into_iter();
+        while let Some(count) = all.next() {
+            let mut corner = || {
+                let [node, x, y, z] = [(); 4].map(|()| all.next().expect("faces are whole"));
+                places.insert(node, [x, y, z].map(f64::from_bits));
+                node
+            };
+            let face: Vec<u64> = (0..count).map(|_| corner()).collect();
+            // All faces of a surface are of one kind.
+            if let [a, b, c, d] = face[..] {
+                triangles.extend([[a, b, c], [a, c, d], [a, b, d], [b, c, d]]);
+                share = 0.5;
+            } else {
+                triangles.push([face[0], face[1], face[2]]);
+            }
+        }
+        let (nodes, points): (Vec<u64>, Vec<[f64; 3]>) = places.into_iter().unzip();
+        let index = |node: u64| nodes.binary_search(&node).expect("every corner is listed");
+        let triangles = triangles.into_iter().map(|triangle| triangle.map(index)).collect();
+        Self { nodes, points, triangles, share }
     }
 
     /// Corners of the triangles.
@@ -61,13 +78,13 @@ impl GatheredSurface {
         dot(diagonal, diagonal).sqrt()
     }
 
-    /// Unit normal of each node, and its share of the area: a third of the adjacent triangles, seen along the normal. A
-    /// pressure times that area along that normal is what the pressure on the triangles does to the node.
+    /// Unit normal of each node, and its share of the area: the integral of its shape function, seen along the normal. A
+    /// pressure times that area along that normal is what the pressure on the faces does to the node.
     pub fn normals_and_areas(&self) -> Vec<([f64; 3], f64)> {
         let mut sums = vec![[0.0; 3]; self.nodes.len()];
         for (triangle, vector) in self.triangles.iter().zip(self.area_vectors()) {
             for &corner in triangle {
-                (0..3).for_each(|a| sums[corner][a] += vector[a] / 3.0);
+                (0..3).for_each(|a| sums[corner][a] += self.share * vector[a] / 3.0);
             }
         }
         let parts = |sum: [f64; 3]| {
@@ -130,11 +147,28 @@ mod tests {
     }
 
     #[test]
+    fn quadrilaterals_share_their_area_equally_on_a_lattice() {
+        on_ranks(&two_bricks(&["body.lower.element=hex8"]), 2, |setup| {
+            let top =
+                |s: &crate::decomposition::Surface| s.body == 0 && s.patch == Patch::Face(crate::mesh::Face::ZMax);
+            let index = setup.discrete.surfaces.iter().position(top).expect("it is in contact");
+            let surface = GatheredSurface::gather(setup.comm, setup.subdomains(), index);
+            for (point, (normal, area)) in surface.points.iter().zip(surface.normals_and_areas()) {
+                let halves =
+                    [(0, 4.0), (1, 2.2)].iter().filter(|(a, end)| point[*a] == 0.0 || point[*a] == *end).count();
+                assert!((area - 1.0 * 1.1 * 0.5_f64.powi(halves as i32)).abs() < 1e-14);
+                assert_eq!(normal, [0.0, 0.0, 1.0]);
+            }
+        });
+    }
+
+    #[test]
     fn at_an_edge_the_normal_is_the_mean_weighted_by_area() {
         let roof = GatheredSurface {
             nodes: vec![0, 1, 2, 3],
             points: vec![[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
             triangles: vec![[0, 2, 1], [0, 1, 3]],
+            share: 1.0,
         };
         let [(ridge, area), _, (slope, third), _] = roof.normals_and_areas()[..] else { panic!("four nodes") };
         let length = 5.0_f64.sqrt();

@@ -19,7 +19,7 @@ pub use subdomain::{Facet, Subdomain};
 use std::collections::BTreeMap;
 
 use crate::comm::{Comm, Shares};
-use crate::element::Kind;
+use crate::element::{Kind, hex8};
 use crate::mesh::{Brick, Face, SolidMesh};
 
 /// A surface that a support, load or contact names.
@@ -93,6 +93,27 @@ impl BodyMesh {
         let brick = self.brick().expect("the body is a brick");
         match self.kind {
             Kind::Tet4 => brick.tet(element).to_vec(),
+            Kind::Hex8 => brick.hexahedron(element).to_vec(),
+        }
+    }
+
+    /// The element of a brick around a point inside it, given in cells from its origin: node numbers within the body, and
+    /// the values there of their shape functions.
+    ///
+    /// # Panics
+    /// If the body is no brick.
+    pub fn around(&self, at: [f64; 3]) -> (Vec<u64>, Vec<f64>) {
+        let brick = self.brick().expect("the body is a brick");
+        match self.kind {
+            Kind::Tet4 => {
+                let (nodes, values) = brick.tet_around(at);
+                (nodes.to_vec(), values.to_vec())
+            }
+            Kind::Hex8 => {
+                let (cell, inside) = brick.around(at);
+                let values = hex8::values(inside.map(|x| 2.0 * x - 1.0));
+                (brick.hexahedron(brick.cell(cell)).to_vec(), values.to_vec())
+            }
         }
     }
 

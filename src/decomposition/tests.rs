@@ -22,6 +22,8 @@ fn scenes() -> Vec<Scene> {
         two_bricks_by_metis(7),
         two_bricks_by_metis(24),
         built_in("patch", &["decomposition.subdomains=24"]),
+        two_bricks(&["body.upper.element=hex8"]),
+        built_in("patch", &["body.lower.element=hex8", "body.upper.element=hex8", "decomposition.subdomains=24"]),
     ]
 }
 
@@ -108,7 +110,8 @@ fn subdomains_are_the_same_on_any_number_of_ranks_and_idle_ranks_do_no_harm() {
 
 #[test]
 fn every_copy_of_a_node_knows_all_others_and_its_surfaces() {
-    for scene in [two_bricks(&[]), two_bricks_by_metis(24), built_in("patch", &[])] {
+    let hexahedra = two_bricks(&["body.upper.element=hex8", "decomposition.subdomains=5"]);
+    for scene in [two_bricks(&[]), two_bricks_by_metis(24), built_in("patch", &[]), hexahedra] {
         for ranks in RANKS {
             let per_rank = on_ranks(&scene, ranks, |setup| {
                 let nodes: Vec<_> = setup.subdomains().iter().map(|s| (s.id as u32, s.nodes.clone())).collect();

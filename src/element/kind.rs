@@ -1,12 +1,14 @@
 //! Which elements there are. Nodes and faces are numbered as VTK and Gmsh do.
 
-use super::tet4;
+use super::{hex8, tet4};
 
 /// A kind of finite element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// The linear tetrahedron.
     Tet4,
+    /// The trilinear hexahedron with mean dilatation.
+    Hex8,
 }
 
 impl Kind {
@@ -14,6 +16,7 @@ impl Kind {
     pub fn nodes(self) -> usize {
         match self {
             Self::Tet4 => 4,
+            Self::Hex8 => 8,
         }
     }
 
@@ -21,6 +24,7 @@ impl Kind {
     pub fn faces(self) -> &'static [&'static [usize]] {
         match self {
             Self::Tet4 => &[&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[0, 3, 2]],
+            Self::Hex8 => &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]],
         }
     }
 
@@ -28,6 +32,7 @@ impl Kind {
     pub fn corners_of_face(self) -> usize {
         match self {
             Self::Tet4 => 3,
+            Self::Hex8 => 4,
         }
     }
 
@@ -35,6 +40,15 @@ impl Kind {
     pub fn per_cell(self) -> u64 {
         match self {
             Self::Tet4 => 6,
+            Self::Hex8 => 1,
+        }
+    }
+
+    /// Linear tetrahedra with as many nodes: what an element costs to solve for.
+    pub fn tetrahedra(self) -> u64 {
+        match self {
+            Self::Tet4 => 1,
+            Self::Hex8 => 6,
         }
     }
 
@@ -46,6 +60,7 @@ impl Kind {
         let whole = "an element has all its nodes";
         match self {
             Self::Tet4 => tet4::shape(nodes.try_into().expect(whole)),
+            Self::Hex8 => hex8::shape(nodes.try_into().expect(whole)),
         }
     }
 }

@@ -1,7 +1,9 @@
 //! Finite elements: their nodes and faces ([`kind`]), where they are integrated, and strains, forces and stiffness there
 //! ([`point`]). Elements take tensors and know no material.
 
+pub mod hex8;
 pub mod kind;
+mod map;
 pub mod point;
 pub mod tet4;
 
@@ -16,6 +18,7 @@ macro_rules! by_kind {
     ($kind:expr, $function:ident($($argument:expr),*)) => {
         match $kind {
             $crate::element::Kind::Tet4 => $function($crate::element::tet4::points, $($argument),*),
+            $crate::element::Kind::Hex8 => $function($crate::element::hex8::points, $($argument),*),
         }
     };
 }

@@ -1,7 +1,7 @@
 //! What every element must do, on distorted shapes.
 
 use super::point::mirror;
-use super::{Nodal, Point, Stiffness, tet4};
+use super::{Nodal, Point, Stiffness, hex8, tet4};
 use crate::material::samples::STEEL;
 use crate::material::{History, Material};
 use crate::random::Random;
@@ -13,6 +13,8 @@ const TET4: Nodal<4> = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0,
 macro_rules! on_all {
     ($check:ident) => {
         shapes(TET4).for_each(|nodes| $check(nodes, tet4::points(&nodes).expect("it has a volume")));
+        let cube = hex8::CORNERS.map(|x| x.map(|x| 0.5 * x));
+        shapes(cube).for_each(|nodes| $check(nodes, hex8::points(&nodes).expect("it has a volume")));
     };
 }
 

@@ -40,7 +40,7 @@ pub fn points(corners: &Nodal<4>) -> Option<[Point<4>; 1]> {
         let (determinant, [a, b, c]) = edges(corners);
         let [b, c, d] = [cross(&b, &c), cross(&c, &a), cross(&a, &b)].map(|g| g.map(|x| x / determinant));
         let a = std::array::from_fn(|i| -(b[i] + c[i] + d[i]));
-        [Point { weight: determinant / 6.0, gradients: [a, b, c, d] }]
+        [Point { weight: determinant / 6.0, gradients: [a, b, c, d], dilatation: None }]
     })
 }
 

@@ -14,6 +14,9 @@ pub type Block = [Range<usize>; 3];
 /// Corners of the six tetrahedra of a cell, positively oriented.
 pub const TETS: [[usize; 4]; 6] = [[0, 1, 2, 5], [0, 2, 4, 5], [2, 4, 5, 6], [1, 3, 2, 5], [3, 5, 7, 2], [2, 5, 7, 6]];
 
+/// Corners of a cell in the order of VTK: around the bottom, then above them.
+pub const HEXAHEDRON: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
+
 /// Corners of the two triangles that [`TETS`] leave on each face of a cell, by [`Face`]; their normals point outwards.
 pub const FACE_TRIANGLES: [[[usize; 3]; 2]; 6] = [
     [[0, 4, 2], [2, 4, 6]],
@@ -118,6 +121,12 @@ impl Brick {
         TETS.map(|tet| tet.map(|v| corners[v]))
     }
 
+    /// Node numbers of a cell as a hexahedron, in the order of VTK.
+    pub fn hexahedron(&self, cell: u64) -> [u64; 8] {
+        let corners = self.corners(self.cell_position(cell));
+        HEXAHEDRON.map(|v| corners[v])
+    }
+
     /// Number of tetrahedron `tet` in 0..6 of a cell.
     pub fn element(&self, cell: [usize; 3], tet: usize) -> u64 {
         6 * self.cell(cell) + tet as u64
@@ -128,11 +137,16 @@ impl Brick {
         self.tets(self.cell_position(element / 6))[(element % 6) as usize]
     }
 
-    /// The element around a point inside the brick, given in cells from its origin: its nodes and the values there of
-    /// their linear functions.
-    pub fn around(&self, at: [f64; 3]) -> ([u64; 4], [f64; 4]) {
+    /// The cell around a point inside the brick, given in cells from its origin, and where in the cell.
+    pub fn around(&self, at: [f64; 3]) -> ([usize; 3], [f64; 3]) {
         let cell: [usize; 3] = std::array::from_fn(|a| (at[a] as usize).min(self.cells[a] - 1));
-        let inside: [f64; 3] = std::array::from_fn(|a| at[a] - cell[a] as f64);
+        (cell, std::array::from_fn(|a| at[a] - cell[a] as f64))
+    }
+
+    /// The tetrahedron around a point inside the brick, given in cells from its origin: its nodes and the values there of
+    /// their linear functions.
+    pub fn tet_around(&self, at: [f64; 3]) -> ([u64; 4], [f64; 4]) {
+        let (cell, inside) = self.around(at);
         let corner = |v: usize| [0, 1, 2].map(|a| (v >> a & 1) as f64);
         let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
         let (weights, tet) = TETS

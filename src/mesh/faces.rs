@@ -147,6 +147,33 @@ mod tests {
     }
 
     #[test]
+    fn hexahedra_of_a_brick_share_faces_of_four_nodes_and_leave_its_outside() {
+        let brick = Brick { origin: [0.0; 3], size: [1.0; 3], cells: [3, 2, 2] };
+        let nodes = (0..brick.cell_count()).flat_map(|cell| brick.hexahedron(cell));
+        let elements = Elements::new(Kind::Hex8, nodes.map(|n| n as u32).collect());
+        let neighbours = Neighbours::new(brick.node_count() as usize, &elements);
+        assert_eq!(neighbours.overlapping, 0);
+        assert_eq!(neighbours.outer(&elements).count(), 2 * (3 * 2 + 3 * 2 + 2 * 2));
+        assert_eq!(neighbours.inner(&elements).count(), 2 * 4 + 3 * 2 + 3 * 2);
+        // From outside: the area vectors of each side look outwards.
+        let place = |n: &u32| brick.coordinates(brick.node_position(u64::from(*n)));
+        for face in neighbours.outer(&elements) {
+            let corners: Vec<_> = face.iter().map(place).collect();
+            let side = Face::ALL
+                .into_iter()
+                .find(|side| face.iter().all(|&n| brick.is_on(*side, brick.node_position(u64::from(n)))));
+            let normal = side.expect("it is on a side").normal();
+            let vector = crate::mesh::surface::shares(&corners)[0];
+            assert!((0..3).map(|a| normal[a] * vector[a]).sum::<f64>() > 0.0);
+        }
+        for cell in 0..elements.len() {
+            for other in neighbours.of(cell).map(|o| o as usize) {
+                assert_eq!(elements.get(cell).iter().filter(|n| elements.get(other).contains(n)).count(), 4);
+            }
+        }
+    }
+
+    #[test]
     fn an_edge_is_no_face_and_faces_with_two_elements_on_a_side_overlap() {
         let count = |nodes: &[[u32; 4]]| {
             let neighbours = Neighbours::new(6, &tets(nodes));

@@ -128,6 +128,8 @@ pub struct Rotation {
 pub enum Element {
     /// Linear tetrahedra, six to a hexahedral cell.
     Tet4,
+    /// Trilinear hexahedra with mean dilatation.
+    Hex8,
 }
 
 impl Element {
@@ -135,6 +137,7 @@ impl Element {
     pub fn per_cell(self) -> usize {
         match self {
             Element::Tet4 => 6,
+            Element::Hex8 => 1,
         }
     }
 }

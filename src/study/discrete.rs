@@ -139,7 +139,8 @@ pub(super) fn cut(wanted: &scene::Decomposition, bodies: &[BodyMesh]) -> Cut {
         scene::Decomposition::Auto if bodies.iter().all(divides) => Cut::Bricks(scene::PAPER_CELLS),
         scene::Decomposition::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
         scene::Decomposition::Metis { subdomains: None } | scene::Decomposition::Auto => {
-            Cut::Metis(cost::subdomains(bodies.iter().map(|b| b.counts().elements).sum(), bodies.len()))
+            let tetrahedra = bodies.iter().map(|b| b.counts().elements * b.kind.tetrahedra()).sum();
+            Cut::Metis(cost::subdomains(tetrahedra, bodies.len()))
         }
     }
 }

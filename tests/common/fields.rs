@@ -15,7 +15,7 @@ pub struct Fields {
     pub points: Vec<[f64; 3]>,
     pub displacement: Vec<[f64; 3]>,
     /// Corners of the elements, as indices into the points.
-    pub elements: Vec<[usize; 4]>,
+    pub elements: Vec<Vec<usize>>,
 }
 
 impl Fields {
@@ -39,18 +39,21 @@ impl Fields {
             let raw = file.dataset(&format!("VTKHDF/{name}")).unwrap().read_raw::<f64>().unwrap();
             raw.as_chunks::<3>().0.to_vec()
         };
-        // Every piece counts its own points.
-        let mut connectivity = Vec::new();
-        let (mut first_point, mut rest) = (0, &numbers("Connectivity")[..]);
-        for (points, entries) in numbers("NumberOfPoints").into_iter().zip(numbers("NumberOfConnectivityIds")) {
-            let (mine, others) = rest.split_at(entries as usize);
-            connectivity.extend(mine.iter().map(|&point| (first_point + point) as usize));
-            (first_point, rest) = (first_point + points, others);
+        // Every piece counts its own points and entries.
+        let mut elements = Vec::new();
+        let (connectivity, offsets) = (numbers("Connectivity"), numbers("Offsets"));
+        let (mut first_point, mut entries, mut offsets) = (0, &connectivity[..], &offsets[..]);
+        for (points, cells) in numbers("NumberOfPoints").into_iter().zip(numbers("NumberOfCells")) {
+            let ends = &offsets[..=cells as usize];
+            let place = |point: &i64| (first_point + point) as usize;
+            elements.extend(ends.windows(2).map(|e| entries[e[0] as usize..e[1] as usize].iter().map(place).collect()));
+            first_point += points;
+            (entries, offsets) = (&entries[ends[cells as usize] as usize..], &offsets[cells as usize + 1..]);
         }
         Fields {
             points: vectors("Points"),
             displacement: state(&file, time, "Point", "displacement").as_chunks::<3>().0.to_vec(),
-            elements: connectivity.as_chunks::<4>().0.to_vec(),
+            elements,
             file,
             time,
         }

@@ -149,6 +149,19 @@ pub enum Problem {
         /// Their kind.
         kind: &'static str,
     },
+    /// Other cells where hexahedra are wanted.
+    #[error(
+        "volume `{volume}` has {cells} {kind} cells, but element = \"hex8\" needs hexahedra alone: mesh with `Transfinite \
+         Volume` and `Recombine Surface`, or `Mesh.SubdivisionAlgorithm = 2;`, or take element = \"tet4\""
+    )]
+    NoHexahedra {
+        /// Name of the volume.
+        volume: String,
+        /// Cells that are none.
+        cells: u64,
+        /// Kind of the first of them.
+        kind: &'static str,
+    },
     /// Elements without a positive volume.
     #[error(
         "volume `{volume}`: {inverted} of {elements} elements are inverted and {degenerate} have no volume, the first \

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use super::Msh;
 use super::error::Problem;
 use super::volume::{higher_order, listed};
+use crate::element::Kind;
 use crate::mesh::faces::{Neighbours, key};
 use crate::mesh::solid::{NamedSurface, SolidMesh};
 use crate::mesh::split;
@@ -85,14 +86,18 @@ impl Boundary<'_> {
             if !block.kind.linear {
                 return Err(higher_order(format!("surface `{name}`"), self.msh.group(2, name)));
             }
+            let mut add = |face: &[u32]| {
+                surface.all += 1;
+                let local: Vec<u32> = face.iter().map(|&n| self.index[n as usize]).collect();
+                if !local.contains(&u32::MAX) {
+                    surface.faces.push(key(&local));
+                }
+            };
             for cell in block.nodes.chunks_exact(block.kind.nodes) {
-                split::triangles(cell, |triangle| {
-                    surface.all += 1;
-                    let local = triangle.map(|n| self.index[n as usize]);
-                    if !local.contains(&u32::MAX) {
-                        surface.faces.push(key(&local));
-                    }
-                });
+                match self.mesh.elements.kind() {
+                    Kind::Tet4 => split::triangles(cell, |triangle| add(&triangle)),
+                    Kind::Hex8 => add(cell),
+                }
             }
         }
         Ok(surface)

@@ -1,7 +1,7 @@
 //! Files that Gmsh wrote (tests/meshes/make.py), and what becomes of them when they are damaged.
 
 use super::*;
-use crate::element::tet4;
+use crate::element::{Kind, tet4};
 use crate::mesh::SolidMesh;
 use crate::mesh::surface::area_vector;
 
@@ -52,8 +52,8 @@ fn assert_same(found: &[SolidMesh], expected: &[SolidMesh]) {
 fn every_format_gives_the_same_bodies() {
     let of = |bytes: &[u8]| {
         let msh = parse(bytes).unwrap();
-        let block = msh.volume(Some("block"), &["base", "both sides", "top"]).unwrap();
-        (block, msh.volume(Some("the rod"), &["both sides", "9"]).unwrap())
+        let block = msh.volume(Some("block"), &["base", "both sides", "top"], Kind::Tet4).unwrap();
+        (block, msh.volume(Some("the rod"), &["both sides", "9"], Kind::Tet4).unwrap())
     };
     let (block, rod) = of(TEXT);
     assert_eq!((block.cells, rod.cells, rod.elements.len()), (90, 42, 42));
@@ -76,7 +76,7 @@ fn every_format_gives_the_same_bodies() {
 
 #[test]
 fn hexahedra_and_prisms_are_split_alike_on_both_sides_of_their_faces() {
-    let mesh = parse(HEXAHEDRA).unwrap().volume(None, &["base", "top"]).unwrap();
+    let mesh = parse(HEXAHEDRA).unwrap().volume(None, &["base", "top"], Kind::Tet4).unwrap();
     assert_eq!((mesh.cells, mesh.elements.len()), (81, 27 * 6 + 54 * 3));
     assert!((volume(&mesh) - 2.0).abs() < 1e-13);
     assert_area(area(&mesh, 0), [0.0, 0.0, -2.0], 18 + 18);
@@ -93,7 +93,7 @@ fn damaged(from: &str, to: &str) -> String {
     assert!(text.contains(from), "`{from}` is not in the file");
     let text = text.replacen(from, to, 1);
     let msh = Msh::parse(text.as_bytes(), text.len() as u64);
-    let used = msh.and_then(|msh| msh.volume(Some("block"), &["base"]));
+    let used = msh.and_then(|msh| msh.volume(Some("block"), &["base"], Kind::Tet4));
     let message = used.expect_err("should be refused").to_string();
     assert!(!message.contains('\n'), "one paragraph: {message}");
     message
@@ -138,7 +138,7 @@ fn missing_sections_are_named() {
     };
     assert_says(&cut("$Nodes", "$EndNodes\n").unwrap_err().to_string(), &["no section $Nodes"]);
     assert_says(&cut("$Elements", "$EndElements\n").unwrap_err().to_string(), &["no section $Elements"]);
-    let untagged = cut("$Entities", "$EndEntities\n").unwrap().volume(Some("block"), &[]);
+    let untagged = cut("$Entities", "$EndEntities\n").unwrap().volume(Some("block"), &[], Kind::Tet4);
     assert_says(&untagged.unwrap_err().to_string(), &["132 of 132 volume cells", "{1, 2}"]);
 }
 
@@ -166,7 +166,7 @@ fn damaged_bytes_are_refused_or_read_but_never_take_memory_or_panic() {
                 damaged[place] = (random.number().abs() * 256.0) as u8;
             }
             if let Ok(msh) = parse(&damaged) {
-                let _ = msh.volume(Some("block"), &["base", "top"]);
+                let _ = msh.volume(Some("block"), &["base", "top"], Kind::Tet4);
             }
         }
     }
@@ -202,7 +202,7 @@ const LOWER: &str = "4 2 2 2 1 3 2 5";
 #[track_caller]
 fn assert_refused(elements: &[&str], volume: Option<&str>, surface: &str, parts: &[&str]) {
     let msh = version_2(&NAMES, &NODES, elements).unwrap();
-    let problem = msh.volume(volume, &[surface]).expect_err("should be refused").to_string();
+    let problem = msh.volume(volume, &[surface], Kind::Tet4).expect_err("should be refused").to_string();
     assert_says(&problem, parts);
     assert!(!problem.contains('\n'), "one paragraph: {problem}");
 }
@@ -210,8 +210,8 @@ fn assert_refused(elements: &[&str], volume: Option<&str>, surface: &str, parts:
 #[test]
 fn a_surface_between_two_volumes_belongs_to_both_with_either_sense() {
     let msh = version_2(&NAMES, &NODES, &[UPPER, LOWER, "2 2 1 7 1 2 3", "2 2 1 7 1 2 3"]).unwrap();
-    let mut up = msh.volume(Some("upper"), &["middle"]).unwrap();
-    let mut down = msh.volume(Some("lower"), &["middle"]).unwrap();
+    let mut up = msh.volume(Some("upper"), &["middle"], Kind::Tet4).unwrap();
+    let mut down = msh.volume(Some("lower"), &["middle"], Kind::Tet4).unwrap();
     assert_area(area(&up, 0), [0.0, 0.0, -0.5], 1);
     assert_area(area(&down, 0), [0.0, 0.0, 0.5], 1);
     (up.surfaces, down.surfaces) = (Vec::new(), Vec::new());

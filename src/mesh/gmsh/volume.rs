@@ -11,11 +11,12 @@ use crate::mesh::quality::Quality;
 use crate::mesh::{Elements, SolidMesh, split};
 
 impl Msh {
-    /// The physical volume of this name (or number, if it has no name), or the only one there is, with these surfaces.
+    /// The physical volume of this name (or number, if it has no name), or the only one there is, with these surfaces, as
+    /// elements of a kind: cells are split into linear tetrahedra, and for others they must be what the kind is.
     ///
     /// # Errors
     /// If the volume or one of the surfaces is missing, or elements cannot be computed with.
-    pub fn volume(&self, volume: Option<&str>, surfaces: &[&str]) -> Result<SolidMesh, Problem> {
+    pub fn volume(&self, volume: Option<&str>, surfaces: &[&str], kind: Kind) -> Result<SolidMesh, Problem> {
         self.refuse_untagged()?;
         let volume = &self.choose(volume)?;
         let mut blocks = Vec::new();
@@ -25,6 +26,7 @@ impl Msh {
             }
             blocks.push(block);
         }
+        refuse_others(volume, kind, &blocks)?;
 
         let mut index = vec![u32::MAX; self.points.len()];
         blocks.iter().flat_map(|b| &b.nodes).for_each(|&n| index[n as usize] = 0);
@@ -37,14 +39,18 @@ impl Msh {
         // Both sides of a face are cut alike because nodes keep their order.
         for block in &blocks {
             for cell in block.nodes.chunks_exact(block.kind.nodes) {
-                split::tetrahedra(cell, |tet| nodes.extend(tet.map(|n| index[n as usize])));
+                match kind {
+                    Kind::Tet4 => split::tetrahedra(cell, |tet| nodes.extend(tet.map(|n| index[n as usize]))),
+                    Kind::Hex8 => nodes.extend(cell.iter().map(|&n| index[n as usize])),
+                }
             }
         }
-        let elements = Elements::new(Kind::Tet4, nodes);
-        if elements.len() >= MOST_ELEMENTS {
-            let limit = format!("the {MOST_ELEMENTS} that a graph of METIS can have");
+        let elements = Elements::new(kind, nodes);
+        let most = MOST_FACES / kind.faces().len();
+        if elements.len() >= most {
+            let limit = format!("the {most} that a graph of METIS can have");
             let announced = elements.len() as u64;
-            return Err(Problem::TooMany { section: "Elements", items: "tetrahedra", announced, limit });
+            return Err(Problem::TooMany { section: "Elements", items: "elements", announced, limit });
         }
         let cells = blocks.iter().map(|b| b.cells).sum();
         let mut mesh = SolidMesh { points, elements, cells, surfaces: Vec::new() };
@@ -124,6 +130,15 @@ fn check_elements(volume: &str, mesh: &SolidMesh) -> Result<(), Problem> {
     Err(Problem::BadElements { volume: volume.to_owned(), elements, inverted, degenerate, near, hint })
 }
 
+/// Refuses cells that the kind of element cannot be made of.
+fn refuse_others(volume: &str, kind: Kind, blocks: &[&Block]) -> Result<(), Problem> {
+    let fits = |block: &&&Block| kind == Kind::Tet4 || block.kind.nodes == kind.nodes();
+    let others: Vec<_> = blocks.iter().filter(|block| !fits(block)).collect();
+    let Some(first) = others.first() else { return Ok(()) };
+    let cells = others.iter().map(|block| block.cells).sum();
+    Err(Problem::NoHexahedra { volume: volume.to_owned(), cells, kind: first.kind.name })
+}
+
 /// Cells of higher order, counted.
 pub(super) fn higher_order<'a>(what: String, blocks: impl Iterator<Item = &'a Block>) -> Problem {
     let curved: Vec<&Block> = blocks.filter(|b| !b.kind.linear).collect();
@@ -140,5 +155,5 @@ pub(super) fn listed(known: &BTreeMap<String, u64>, items: &str) -> String {
     format!("there are {}", each.join(", "))
 }
 
-/// Elements that the graph of METIS can number: four faces each, in 31 bits.
-const MOST_ELEMENTS: usize = 1 << 29;
+/// Faces that the graph of METIS can number, in 31 bits.
+const MOST_FACES: usize = 1 << 31;
