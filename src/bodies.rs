@@ -81,6 +81,7 @@ pub fn bricks(scene: &Scene) -> Option<Vec<BodyMesh>> {
 fn kind(element: scene::Element) -> Kind {
     match element {
         scene::Element::Tet4 => Kind::Tet4,
+        scene::Element::Tet10 => Kind::Tet10,
         scene::Element::Hex8 => Kind::Hex8,
     }
 }

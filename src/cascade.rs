@@ -172,8 +172,10 @@ mod tests {
 
     #[test]
     fn linear_displacements_pass_exactly() {
-        for element in ["body.upper.element=tet4", "body.upper.element=hex8"] {
-            let scenes = [two_bricks(&[element]), two_bricks(&[&FINER[..], &[element]].concat())];
+        for element in ["tet4", "hex8", "tet10"] {
+            let elements = ["lower", "upper"].map(|body| format!("body.{body}.element={element}"));
+            let elements = [&elements[0][..], &elements[1][..]];
+            let scenes = [two_bricks(&elements), two_bricks(&[&FINER[..], &elements].concat())];
             let [coarse, fine] = scenes.map(|scene| discrete(&scene, &Solo));
             for (found, exact) in pass(&Solo, &coarse, &fine, 0.0).iter().zip(field(&fine, 0.0)) {
                 assert!(found.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-13));

@@ -199,7 +199,7 @@ pub fn solve(
             report.borrow_mut()(Event::Warning(format!("{place}: {reason}; the increment is halved")));
         }
         Progress::Solution(at, solution) => {
-            let contact = contact_states(problem, solution);
+            let contact = contact_states(problem, &discrete.pairs, solution);
             fields::record(&mut piece, at.time(), problem, &solution.u, &discrete.pairs, &contact);
             rows.push(step_row(scene, discrete, problem, at, solution, &contact));
             closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();

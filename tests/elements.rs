@@ -74,3 +74,18 @@ fn the_benchmark_converges_from_rest_and_from_a_coarser_level_alike() {
         }
     }
 }
+
+#[test]
+fn quadratic_elements_solve_the_benchmark_with_less_energy_on_the_same_cells() {
+    let solved = |ranks, element: &str| {
+        let elements = ["lower", "upper"].map(|body| format!("body.{body}.element={element}"));
+        let sets: Vec<&str> = COARSE.into_iter().chain(elements.iter().map(String::as_str)).collect();
+        solve(ranks, "two-blocks", &sets).converged().summary()
+    };
+    let [alone, quadratic] = [1, 2].map(|ranks| solved(ranks, "tet10"));
+    assert_residuals(&quadratic, 1e-6);
+    for key in ["energy", "max_von_mises", "hessian_multiplications", "plastic_elements", "active_contacts"] {
+        assert_eq!(alone[key], quadratic[key], "{key} on one rank and on two");
+    }
+    assert!(number(&quadratic, "energy") < number(&solved(2, "tet4"), "energy"));
+}

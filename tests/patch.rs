@@ -65,7 +65,7 @@ fn a_bar_in_one_subdomain_or_many_stretches_the_same() {
 }
 
 /// Elements other than the default.
-const ELEMENTS: [&str; 1] = ["hex8"];
+const ELEMENTS: [&str; 2] = ["hex8", "tet10"];
 
 #[test]
 fn a_bar_of_other_elements_stretches_the_same() {
@@ -146,12 +146,17 @@ fn two_blocks_of_other_elements_share_the_push() {
         let [lower, upper] = ["lower", "upper"].map(|body| format!("body.{body}.element={element}"));
         assert_blocks(10.0, 1.0, 472.5, &[&lower, &upper]);
         assert_blocks(3.0, 0.0, 315.0, &[&lower, &upper, "decomposition.subdomains=9"]);
-        // The same nodes, but other faces: a mortar contact. And nodes that do not match.
-        assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[&upper]);
-        assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[&lower]);
-        let other = ["body.lower.brick.cells=[6, 5, 2]", "decomposition.subdomains=8"];
-        assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[&other[..], &[&lower, &upper]].concat());
     }
+}
+
+#[test]
+fn hexahedra_that_do_not_match_share_the_push() {
+    let [lower, upper] = ["body.lower.element=hex8", "body.upper.element=hex8"];
+    // The same nodes as tetrahedra, but other faces. And nodes that do not match.
+    assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[upper]);
+    assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[lower]);
+    let other = ["body.lower.brick.cells=[6, 5, 2]", "decomposition.subdomains=8"];
+    assert_blocks(10.0, 0.0, 477.272_727_272_727_3, &[&other[..], &[lower, upper]].concat());
 }
 
 #[test]

@@ -15,7 +15,7 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkCommonDataModel import vtkPartitionedDataSet
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
-NODES_OF_TYPE = {10: 4, 12: 8}
+NODES_OF_TYPE = {10: 4, 12: 8, 24: 10}
 
 NAN_WHERE_UNDEFINED = {"contact_gap"}
 """Fields that exist on a part of the mesh only: there is no gap off the slave surfaces."""

@@ -2,7 +2,7 @@
 
 use super::integrated;
 use crate::decomposition::Subdomain;
-use crate::element::{Kind, Nodal, Point, hex8, tet4};
+use crate::element::{Kind, Nodal, Point, hex8, tet4, tet10};
 use crate::mesh::surface;
 
 /// A uniform load on a named surface or in a body.
@@ -49,16 +49,16 @@ pub fn add(subdomain: &Subdomain, loads: &[Load], forces: &mut [f64]) {
     for facet in &subdomain.facets {
         let face: Vec<[f64; 3]> = facet.nodes.iter().map(|&n| subdomain.points[n as usize]).collect();
         for load in loads {
-            for (&node, share) in facet.nodes.iter().zip(surface::shares(&face)) {
-                match load {
-                    Load::Traction { surface, value } if *surface == facet.surface => {
-                        give(node, value.map(|v| surface::length(&share) * v));
-                    }
-                    Load::Pressure { surface, value } if *surface == facet.surface => {
-                        give(node, share.map(|n| -value * n));
-                    }
-                    _ => {}
+            match load {
+                Load::Traction { surface, value } if *surface == facet.surface => {
+                    let areas = surface::areas(&face);
+                    facet.nodes.iter().zip(areas).for_each(|(&node, area)| give(node, value.map(|v| area * v)));
                 }
+                Load::Pressure { surface, value } if *surface == facet.surface => {
+                    let shares = surface::shares(&face);
+                    facet.nodes.iter().zip(shares).for_each(|(&node, share)| give(node, share.map(|n| -value * n)));
+                }
+                _ => {}
             }
         }
     }
@@ -68,6 +68,7 @@ pub fn add(subdomain: &Subdomain, loads: &[Load], forces: &mut [f64]) {
             let mut give = |node: u32, volume: f64| give(node, value.map(|v| volume * v));
             match subdomain.elements.kind() {
                 Kind::Tet4 => share_volumes(tet4::points, &tet4::VALUES, subdomain, &mut give),
+                Kind::Tet10 => share_volumes(tet10::points, &tet10::values_at_points(), subdomain, &mut give),
                 Kind::Hex8 => share_volumes(hex8::points, &hex8::values_at_points(), subdomain, &mut give),
             }
         }

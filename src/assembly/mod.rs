@@ -38,4 +38,6 @@ fn committed(history: &[History], point: usize) -> &History {
 }
 
 #[cfg(test)]
+mod orders;
+#[cfg(test)]
 mod tests;

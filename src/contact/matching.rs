@@ -151,6 +151,7 @@ mod tests {
             points,
             triangles,
             share: 1.0,
+            quadratic: Vec::new(),
         }
     }
 

@@ -1,9 +1,10 @@
 //! Contact geometry: which points of two surfaces face each other, normals and gaps. No unknowns, no multipliers.
 //!
 //! Every condition is one on a slave node: against the master node opposite where meshes match ([`matching`]), against
-//! weighted means of master nodes where they do not ([`mortar`]), or against a rigid obstacle ([`rigid`]). [`pairing`]
-//! finds out which, and which surface is the slave. Surfaces are two-dimensional, so every rank sees both sides of each
-//! contact whole, for the time of the pairing only; what is kept of it are the pairs.
+//! weighted means of master nodes where they do not ([`mortar`]), or against a rigid obstacle ([`rigid`]). On quadratic
+//! faces conditions of nodes are combined ([`quadratic`]). [`pairing`] finds out which, and which surface is the slave.
+//! Surfaces are two-dimensional, so every rank sees both sides of each contact whole, for the time of the pairing only; what
+//! is kept of it are the pairs.
 
 pub mod clip;
 pub mod corner;
@@ -11,6 +12,7 @@ pub mod dual;
 pub mod matching;
 pub mod mortar;
 pub mod pairing;
+pub mod quadratic;
 pub mod rigid;
 pub mod surface;
 pub mod tree;
@@ -25,7 +27,8 @@ pub struct ContactPair {
     pub contact: usize,
     /// Global node on the slave surface.
     pub slave: u64,
-    /// Other nodes of the slave surface that move with it: some that supports hold; usually none.
+    /// Other nodes of the slave surface in the condition: some that supports hold, corners of a quadratic face; usually
+    /// none.
     pub others: Vec<(u64, f64)>,
     /// Global nodes on the master surface with their weights, which add up to those of the slave side; none on a rigid
     /// obstacle.
@@ -51,14 +54,18 @@ impl ContactPair {
 
     /// Moves the other side away along the normal (length).
     pub fn widen(&mut self, distance: f64) {
-        let others: f64 = self.others.iter().map(|(_, weight)| weight).sum();
-        self.gap += (1.0 + others) * distance;
+        self.gap += self.factor() * distance;
+    }
+
+    /// What the factors of the slave side's nodes add up to: the condition is met at this many times the distance.
+    pub fn factor(&self) -> f64 {
+        1.0 + self.others.iter().map(|(_, weight)| weight).sum::<f64>()
     }
 
     /// Force on the slave surface where the condition is met with this force: the master's nodes take all of it.
     pub fn force(&self, force: f64) -> [f64; 3] {
-        let others: f64 = self.others.iter().map(|(_, weight)| weight).sum();
-        self.normal.map(|n| -(1.0 + others) * force * n)
+        let factor = self.factor();
+        self.normal.map(|n| -factor * force * n)
     }
 }
 
@@ -71,6 +78,15 @@ pub enum ContactError {
          or leave that direction free"
     )]
     AllHeld {
+        /// Name of the contact in the scene.
+        name: String,
+    },
+    /// Quadratic elements, and nodes or faces that do not coincide.
+    #[error(
+        "contact.{name}: the meshes of its surfaces do not match, which element = \"tet10\" cannot have in contact: make nodes and \
+         faces of both coincide, or take element = \"hex8\" or \"tet4\""
+    )]
+    NotMatching {
         /// Name of the contact in the scene.
         name: String,
     },

@@ -5,7 +5,7 @@
 //! enter between its own. If that does not decide either, it is the one named first.
 
 use super::surface::GatheredSurface;
-use super::{ContactError, ContactPair, matching, mortar};
+use super::{ContactError, ContactPair, matching, mortar, quadratic};
 
 /// What the conditions on the slave nodes are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub type HeldNodes<'a> = &'a dyn Fn(&[u64]) -> Vec<[bool; 3]>;
 /// Conditions of contact number `contact`, ascending by slave node. Collective.
 ///
 /// # Errors
-/// If the surfaces do not face each other, or supports hold all slave nodes that do.
+/// If the surfaces do not face each other, or supports hold all slave nodes that do, or quadratic faces do not match.
 pub fn pair(
     contact: usize,
     name: &str,
@@ -30,10 +30,16 @@ pub fn pair(
     master: &GatheredSurface,
     held: HeldNodes,
 ) -> Result<(Vec<ContactPair>, Rule), ContactError> {
-    match matching::pair(contact, slave, master) {
-        Some(pairs) if pairs.is_empty() => Err(ContactError::Apart { name: name.to_owned() }),
-        Some(pairs) => Ok((pairs, Rule::NodeToNode)),
-        None => Ok((mortar::pair(contact, name, slave, master, &held(&slave.nodes))?, Rule::Mortar)),
+    let quadratic = [slave, master].map(|surface| !surface.quadratic.is_empty());
+    match (matching::pair(contact, slave, master), quadratic) {
+        (Some(pairs), _) if pairs.is_empty() => Err(ContactError::Apart { name: name.to_owned() }),
+        (Some(pairs), [false, false]) => Ok((pairs, Rule::NodeToNode)),
+        (Some(pairs), [true, true]) => {
+            let gap = |pair: &ContactPair, along| quadratic::distance(slave, master, pair, along);
+            Ok((quadratic::conditions(slave, pairs, gap), Rule::NodeToNode))
+        }
+        (_, [true, _] | [_, true]) => Err(ContactError::NotMatching { name: name.to_owned() }),
+        (None, [false, false]) => Ok((mortar::pair(contact, name, slave, master, &held(&slave.nodes))?, Rule::Mortar)),
     }
 }
 

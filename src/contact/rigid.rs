@@ -193,6 +193,7 @@ mod tests {
             points: vec![[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 0.0]],
             triangles: vec![[0, 1, 2], [3, 2, 1]],
             share: 1.0,
+            quadratic: Vec::new(),
         };
         let wall = |x: f64, normal: f64| Obstacle::Plane { point: [x, 0.0, 0.0], normal: [normal, 0.0, 0.0] };
         let right = pair(2, "wall", &roof, &wall(3.0, -1.0)).expect("one slope faces it");

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::quadratic;
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Subdomain;
 use crate::mesh::surface::area_vector;
@@ -17,6 +18,8 @@ pub struct GatheredSurface {
     pub triangles: Vec<[usize; 3]>,
     /// How much a triangle counts: a half where quadrilaterals are cut in both ways, else one.
     pub share: f64,
+    /// Faces with quadratic shape functions: corners, then the middles of the edges between them. Each is four triangles.
+    pub quadratic: Vec<[usize; 6]>,
 }
 
 impl GatheredSurface {
@@ -32,7 +35,8 @@ impl GatheredSurface {
                 }
             }
         }
-        let (mut places, mut triangles, mut share) = (BTreeMap::new(), Vec::new(), 1.0);
+        let (mut places, mut triangles, mut quadratic) = (BTreeMap::new(), Vec::new(), Vec::new());
+        let mut share = 1.0;
         let mut all = all_gather_u64(comm, &mine).into_iter();
         while let Some(count) = all.next() {
             let mut corner = || {
@@ -42,17 +46,23 @@ impl GatheredSurface {
             };
             let face: Vec<u64> = (0..count).map(|_| corner()).collect();
             // All faces of a surface are of one kind.
-            if let [a, b, c, d] = face[..] {
-                triangles.extend([[a, b, c], [a, c, d], [a, b, d], [b, c, d]]);
-                share = 0.5;
-            } else {
-                triangles.push([face[0], face[1], face[2]]);
+            match face[..] {
+                [a, b, c, d] => {
+                    triangles.extend([[a, b, c], [a, c, d], [a, b, d], [b, c, d]]);
+                    share = 0.5;
+                }
+                [a, b, c, ab, bc, ca] => {
+                    triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+                    quadratic.push([a, b, c, ab, bc, ca]);
+                }
+                _ => triangles.push([face[0], face[1], face[2]]),
             }
         }
         let (nodes, points): (Vec<u64>, Vec<[f64; 3]>) = places.into_iter().unzip();
         let index = |node: u64| nodes.binary_search(&node).expect("every corner is listed");
         let triangles = triangles.into_iter().map(|triangle| triangle.map(index)).collect();
-        Self { nodes, points, triangles, share }
+        let quadratic = quadratic.into_iter().map(|face: [u64; 6]| face.map(index)).collect();
+        Self { nodes, points, triangles, share, quadratic }
     }
 
     /// Corners of the triangles.
@@ -78,8 +88,9 @@ impl GatheredSurface {
         dot(diagonal, diagonal).sqrt()
     }
 
-    /// Unit normal of each node, and its share of the area: the integral of its shape function, seen along the normal. A
-    /// pressure times that area along that normal is what the pressure on the faces does to the node.
+    /// Unit normal of each node, and its share of the area: the integral of its shape function, seen along the normal; with
+    /// quadratic ones that of [`quadratic`]. A pressure times that area along that normal is what the pressure on the faces
+    /// does to the node.
     pub fn normals_and_areas(&self) -> Vec<([f64; 3], f64)> {
         let mut sums = vec![[0.0; 3]; self.nodes.len()];
         for (triangle, vector) in self.triangles.iter().zip(self.area_vectors()) {
@@ -91,7 +102,11 @@ impl GatheredSurface {
             let area = dot(sum, sum).sqrt();
             (sum.map(|s| s / area), area)
         };
-        sums.into_iter().map(parts).collect()
+        let mut all: Vec<_> = sums.into_iter().map(parts).collect();
+        if !self.quadratic.is_empty() {
+            all.iter_mut().zip(quadratic::areas(self)).for_each(|((_, sum), area)| *sum = area);
+        }
+        all
     }
 
     /// Typical edge length: root of twice the mean triangle area.
@@ -169,6 +184,7 @@ mod tests {
             points: vec![[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
             triangles: vec![[0, 2, 1], [0, 1, 3]],
             share: 1.0,
+            quadratic: Vec::new(),
         };
         let [(ridge, area), _, (slope, third), _] = roof.normals_and_areas()[..] else { panic!("four nodes") };
         let length = 5.0_f64.sqrt();

@@ -19,7 +19,7 @@ pub use subdomain::{Facet, Subdomain};
 use std::collections::BTreeMap;
 
 use crate::comm::{Comm, Shares};
-use crate::element::{Kind, hex8};
+use crate::element::{Kind, hex8, tet10};
 use crate::mesh::{Brick, Face, SolidMesh};
 
 /// A surface that a support, load or contact names.
@@ -82,7 +82,7 @@ impl BodyMesh {
 
     /// The brick whose nodes are those of the body.
     pub fn lattice(&self) -> Option<Brick> {
-        self.brick().copied()
+        self.brick().map(|brick| brick.refined(self.kind.degree()))
     }
 
     /// Node numbers, within the body, of an element of a brick.
@@ -93,6 +93,14 @@ impl BodyMesh {
         let brick = self.brick().expect("the body is a brick");
         match self.kind {
             Kind::Tet4 => brick.tet(element).to_vec(),
+            Kind::Tet10 => {
+                // Nodes are on a lattice twice as fine, which corners and middles of edges fill.
+                let lattice = brick.refined(2);
+                let corners = brick.tet(element).map(|node| brick.node_position(node));
+                let middle = |a: usize, b: usize| std::array::from_fn(|i| corners[a][i] + corners[b][i]);
+                let of_corners = (0..4).map(|a| lattice.node(middle(a, a)));
+                of_corners.chain(tet10::EDGES.iter().map(|&(a, b)| lattice.node(middle(a, b)))).collect()
+            }
             Kind::Hex8 => brick.hexahedron(element).to_vec(),
         }
     }
@@ -105,9 +113,10 @@ impl BodyMesh {
     pub fn around(&self, at: [f64; 3]) -> (Vec<u64>, Vec<f64>) {
         let brick = self.brick().expect("the body is a brick");
         match self.kind {
-            Kind::Tet4 => {
-                let (nodes, values) = brick.tet_around(at);
-                (nodes.to_vec(), values.to_vec())
+            Kind::Tet4 | Kind::Tet10 => {
+                let (element, values) = brick.tet_around(at);
+                let quadratic = self.kind == Kind::Tet10;
+                (self.element(element), if quadratic { tet10::values(values).to_vec() } else { values.to_vec() })
             }
             Kind::Hex8 => {
                 let (cell, inside) = brick.around(at);

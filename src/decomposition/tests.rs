@@ -23,6 +23,7 @@ fn scenes() -> Vec<Scene> {
         two_bricks_by_metis(24),
         built_in("patch", &["decomposition.subdomains=24"]),
         two_bricks(&["body.upper.element=hex8"]),
+        two_bricks(&["body.lower.element=tet10", "body.upper.element=tet10", "decomposition.subdomains=7"]),
         built_in("patch", &["body.lower.element=hex8", "body.upper.element=hex8", "decomposition.subdomains=24"]),
     ]
 }
@@ -111,7 +112,8 @@ fn subdomains_are_the_same_on_any_number_of_ranks_and_idle_ranks_do_no_harm() {
 #[test]
 fn every_copy_of_a_node_knows_all_others_and_its_surfaces() {
     let hexahedra = two_bricks(&["body.upper.element=hex8", "decomposition.subdomains=5"]);
-    for scene in [two_bricks(&[]), two_bricks_by_metis(24), built_in("patch", &[]), hexahedra] {
+    let quadratic = two_bricks(&["body.lower.element=tet10", "body.upper.element=tet10"]);
+    for scene in [two_bricks(&[]), two_bricks_by_metis(24), built_in("patch", &[]), hexahedra, quadratic] {
         for ranks in RANKS {
             let per_rank = on_ranks(&scene, ranks, |setup| {
                 let nodes: Vec<_> = setup.subdomains().iter().map(|s| (s.id as u32, s.nodes.clone())).collect();
@@ -141,7 +143,7 @@ fn surfaces_of_nodes(setup: &Setup) -> BTreeMap<u64, Vec<u32>> {
     let mut result: BTreeMap<u64, Vec<u32>> = BTreeMap::new();
     for (index, surface) in setup.discrete.surfaces.iter().enumerate() {
         let body = &setup.discrete.bodies[surface.body];
-        let (brick, Patch::Face(face)) = (body.brick().unwrap(), &surface.patch) else { panic!("bodies are bricks") };
+        let (brick, Patch::Face(face)) = (body.lattice().unwrap(), &surface.patch) else { panic!("bodies are bricks") };
         for node in 0..brick.node_count() {
             if brick.is_on(*face, brick.node_position(node)) {
                 result.entry(body.first_node + node).or_default().push(index as u32);

@@ -63,7 +63,7 @@ fn derivatives(at: &[f64; 3]) -> Nodal<8> {
 
 /// A point of unit weight in the reference cube, without its dilatation.
 #[inline]
-fn at(nodes: &Nodal<8>, place: &[f64; 3]) -> Point<8> {
+pub fn at(nodes: &Nodal<8>, place: &[f64; 3]) -> Point<8> {
     let (determinant, gradients) = map::gradients(nodes, &derivatives(place));
     Point { weight: determinant, gradients, dilatation: None }
 }

@@ -5,6 +5,7 @@ pub mod hex8;
 pub mod kind;
 mod map;
 pub mod point;
+pub mod tet10;
 pub mod tet4;
 
 pub use kind::Kind;
@@ -18,6 +19,7 @@ macro_rules! by_kind {
     ($kind:expr, $function:ident($($argument:expr),*)) => {
         match $kind {
             $crate::element::Kind::Tet4 => $function($crate::element::tet4::points, $($argument),*),
+            $crate::element::Kind::Tet10 => $function($crate::element::tet10::points, $($argument),*),
             $crate::element::Kind::Hex8 => $function($crate::element::hex8::points, $($argument),*),
         }
     };

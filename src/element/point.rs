@@ -103,15 +103,11 @@ impl<const N: usize> Point<N> {
 /// Copies the upper triangle to the lower one: the matrix is symmetric to the last bit.
 #[inline]
 pub fn mirror<const N: usize>(k: &mut Stiffness<N>) {
-    for a in 0..N {
-        for i in 0..3 {
-            for b in 0..=a {
-                for j in 0..3 {
-                    if (b, j) < (a, i) {
-                        k[a][i][b][j] = k[b][j][a][i];
-                    }
-                }
-            }
+    let rows = k.as_flattened_mut();
+    for i in 1..rows.len() {
+        let (above, below) = rows.split_at_mut(i);
+        for (entry, row) in below[0].as_flattened_mut().iter_mut().zip(above) {
+            *entry = row.as_flattened()[i];
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What every element must do, on distorted shapes.
 
 use super::point::mirror;
-use super::{Nodal, Point, Stiffness, hex8, tet4};
+use super::{Nodal, Point, Stiffness, hex8, tet4, tet10};
 use crate::material::samples::STEEL;
 use crate::material::{History, Material};
 use crate::random::Random;
@@ -13,6 +13,9 @@ const TET4: Nodal<4> = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0,
 macro_rules! on_all {
     ($check:ident) => {
         shapes(TET4).for_each(|nodes| $check(nodes, tet4::points(&nodes).expect("it has a volume")));
+        shapes(TET4)
+            .map(|corners| bent(&corners))
+            .for_each(|nodes| $check(nodes, tet10::points(&nodes).expect("it has a volume")));
         let cube = hex8::CORNERS.map(|x| x.map(|x| 0.5 * x));
         shapes(cube).for_each(|nodes| $check(nodes, hex8::points(&nodes).expect("it has a volume")));
     };
@@ -26,6 +29,17 @@ fn shapes<const N: usize>(reference: Nodal<N>) -> impl Iterator<Item = Nodal<N>>
             std::array::from_fn(|i| 10.0 * (x[i] + shift[i]) + 100.0)
         })
     })
+}
+
+/// The quadratic element on these corners, its edges slightly curved.
+fn bent(corners: &Nodal<4>) -> Nodal<10> {
+    let mut random = Random::new(4);
+    let mut middle = |(a, b): (usize, usize)| {
+        let shift: [f64; 3] = random.vector(0.5);
+        std::array::from_fn(|i| 0.5 * (corners[a][i] + corners[b][i]) + shift[i])
+    };
+    let middles = tet10::EDGES.map(&mut middle);
+    std::array::from_fn(|a| if a < 4 { corners[a] } else { middles[a - 4] })
 }
 
 fn random_field<const N: usize>(random: &mut Random, size: f64) -> Nodal<N> {

@@ -143,19 +143,18 @@ impl Brick {
         (cell, std::array::from_fn(|a| at[a] - cell[a] as f64))
     }
 
-    /// The tetrahedron around a point inside the brick, given in cells from its origin: its nodes and the values there of
-    /// their linear functions.
-    pub fn tet_around(&self, at: [f64; 3]) -> ([u64; 4], [f64; 4]) {
+    /// The tetrahedron around a point inside the brick, given in cells from its origin: its number, and the barycentric
+    /// coordinates of the point.
+    pub fn tet_around(&self, at: [f64; 3]) -> (u64, [f64; 4]) {
         let (cell, inside) = self.around(at);
         let corner = |v: usize| [0, 1, 2].map(|a| (v >> a & 1) as f64);
         let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
-        let (weights, tet) = TETS
-            .map(|tet| (barycentric(tet.map(corner), inside), tet))
-            .into_iter()
+        let (weights, tet) = (0..)
+            .zip(TETS)
+            .map(|(number, tet)| (barycentric(tet.map(corner), inside), number))
             .reduce(|best, other| if least(&other.0) > least(&best.0) { other } else { best })
             .expect("a cell has six elements");
-        let corners = self.corners(cell);
-        (tet.map(|v| corners[v]), weights)
+        (self.element(cell, tet), weights)
     }
 
     /// The layer of cells that touch a face.

@@ -23,8 +23,8 @@ pub fn normal(corners: &[[f64; 3]; 3]) -> Option<[f64; 3]> {
     (area > 0.0).then(|| vector.map(|c| c / area))
 }
 
-/// Integral of each node's shape function over a face, times its direction if the face is flat (area): what a unit
-/// pressure inwards takes from the nodes.
+/// Integral over a face of each node's shape function times the unit normal (area): what a unit pressure inwards takes
+/// from the nodes.
 ///
 /// # Panics
 /// If no face has so many nodes.
@@ -36,8 +36,55 @@ pub fn shares(face: &[[f64; 3]]) -> Vec<[f64; 3]> {
             let of_corner = [[d, a, b], [a, b, c], [b, c, d], [c, d, a]].map(|t| area_vector(&t));
             of_corner.map(|own| std::array::from_fn(|i| (whole[0][i] + whole[1][i] + own[i]) / 6.0)).to_vec()
         }
+        [a, b, c, ab, bc, ca] => {
+            let mut shares = vec![[0.0; 3]; 6];
+            for (values, normal) in quadratic_points(&[a, b, c, ab, bc, ca]) {
+                for (share, value) in shares.iter_mut().zip(values) {
+                    (0..3).for_each(|i| share[i] += value * normal[i]);
+                }
+            }
+            shares
+        }
         _ => panic!("no face has {} nodes", face.len()),
     }
+}
+
+/// Integral over a face of each node's shape function (area): what a unit traction gives to the nodes. A quadrilateral is
+/// taken as flat.
+///
+/// # Panics
+/// If no face has so many nodes.
+pub fn areas(face: &[[f64; 3]]) -> Vec<f64> {
+    match *face {
+        [a, b, c] => vec![area(&[a, b, c]) / 3.0; 3],
+        [a, b, c, ab, bc, ca] => {
+            let mut areas = vec![0.0; 6];
+            for (values, normal) in quadratic_points(&[a, b, c, ab, bc, ca]) {
+                areas.iter_mut().zip(values).for_each(|(area, value)| *area += value * length(&normal));
+            }
+            areas
+        }
+        _ => shares(face).iter().map(length).collect(),
+    }
+}
+
+/// Six points of a triangle with quadratic shape functions, which may be curved: their values, and the normal times the
+/// area that the point stands for. Exact for polynomials of degree four (Dunavant 1985).
+fn quadratic_points(face: &[[f64; 3]; 6]) -> impl Iterator<Item = ([f64; 6], [f64; 3])> {
+    const RULE: [(f64, f64, f64); 2] = [
+        (0.445_948_490_915_965, 0.108_103_018_168_070, 0.223_381_589_678_011),
+        (0.091_576_213_509_771, 0.816_847_572_980_459, 0.109_951_743_655_322),
+    ];
+    (0..6).map(move |k| {
+        let (twice, once, weight) = RULE[k / 3];
+        let [p, q, r] = std::array::from_fn(|a| if a == k % 3 { once } else { twice });
+        let corners = [p, q, r].map(|x| x * (2.0 * x - 1.0));
+        let values = [corners[0], corners[1], corners[2], 4.0 * p * q, 4.0 * q * r, 4.0 * r * p];
+        let first = [1.0 - 4.0 * p, 4.0 * q - 1.0, 0.0, 4.0 * (p - q), 4.0 * r, -4.0 * r];
+        let second = [1.0 - 4.0 * p, 0.0, 4.0 * r - 1.0, -4.0 * q, 4.0 * q, 4.0 * (p - r)];
+        let along = |d: [f64; 6]| std::array::from_fn(|i| (0..6).map(|k| d[k] * face[k][i]).sum());
+        (values, area_vector(&[[0.0; 3], along(first), along(second)]).map(|x| weight * x))
+    })
 }
 
 /// Length of a vector.
@@ -75,11 +122,46 @@ mod tests {
     }
 
     #[test]
+    fn middles_of_a_flat_quadratic_triangle_get_a_third_each_and_corners_nothing() {
+        let corners = [[1.0, 1.0, 2.0], [3.0, 1.0, 2.0], [1.0, 4.0, 2.0]];
+        let middle = |a: usize, b: usize| std::array::from_fn(|i| 0.5 * (corners[a][i] + corners[b][i]));
+        let [a, b, c] = corners;
+        let face = [a, b, c, middle(0, 1), middle(1, 2), middle(2, 0)];
+        for (k, (share, area)) in shares(&face).iter().zip(areas(&face)).enumerate() {
+            let expected = if k < 3 { 0.0 } else { 1.0 };
+            assert!((share[2] - expected).abs() + share[0].abs() + share[1].abs() < 1e-13, "{share:?}");
+            assert!((area - expected).abs() < 1e-13, "{area}");
+        }
+    }
+
+    /// Area vectors of curved faces depend on their rim alone: that of a pyramid over the same rim.
+    #[test]
+    fn shares_of_a_curved_triangle_add_up_to_the_vector_of_its_rim() {
+        let face = [[0.0; 3], [2.0, 0.0, 0.1], [0.2, 1.5, 0.0], [1.0, -0.2, 0.3], [1.2, 0.9, 0.4], [0.0, 0.7, -0.2]];
+        let sum = shares(&face).iter().fold([0.0; 3], |sum, s| std::array::from_fn(|i| sum[i] + s[i]));
+        let mut expected = [0.0; 3];
+        for (a, b, m) in [(0, 1, 3), (1, 2, 4), (2, 0, 5)] {
+            // Half the integral of x cross dx along a parabola, by three points of Simpson's rule on its exact derivative.
+            for (t, w) in [(0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0)] {
+                let values = [(1.0 - t) * (1.0 - 2.0 * t), t * (2.0 * t - 1.0), 4.0 * t * (1.0 - t)];
+                let slopes = [4.0 * t - 3.0, 4.0 * t - 1.0, 4.0 - 8.0 * t];
+                let along = |d: [f64; 3]| -> [f64; 3] {
+                    std::array::from_fn(|i| d[0] * face[a][i] + d[1] * face[b][i] + d[2] * face[m][i])
+                };
+                let part = area_vector(&[[0.0; 3], along(values), along(slopes)]);
+                (0..3).for_each(|i| expected[i] += w * part[i]);
+            }
+        }
+        assert!((0..3).all(|i| (sum[i] - expected[i]).abs() < 1e-13), "{sum:?} {expected:?}");
+    }
+
+    #[test]
     fn area_normal_and_thirds() {
         let corners = [[1.0, 1.0, 2.0], [3.0, 1.0, 2.0], [1.0, 4.0, 2.0]];
         assert_eq!(area(&corners), 3.0);
         assert_eq!(normal(&corners), Some([0.0, 0.0, 1.0]));
         assert_eq!(shares(&corners), [[0.0, 0.0, 1.0]; 3]);
+        assert_eq!(areas(&corners), [1.0; 3]);
         assert_eq!(normal(&[[1.0; 3]; 3]), None);
     }
 }

@@ -12,6 +12,7 @@ use crate::newton::TornProblem;
 fn vtk_type(kind: Kind) -> u8 {
     match kind {
         Kind::Tet4 => 10,
+        Kind::Tet10 => 24,
         Kind::Hex8 => 12,
     }
 }

@@ -14,7 +14,7 @@ pub struct Piece {
     pub connectivity: Vec<u64>,
     /// Where each cell begins in `connectivity`, and where the last one ends: cells + 1 numbers, the first is 0.
     pub offsets: Vec<u64>,
-    /// VTK's type of each cell: 10 tetrahedron, 12 hexahedron.
+    /// VTK's type of each cell: 10 tetrahedron, 12 hexahedron, 24 quadratic tetrahedron.
     pub types: Vec<u8>,
     /// When the states of the fields were recorded, ascending.
     pub times: Vec<f64>,

@@ -128,6 +128,8 @@ pub struct Rotation {
 pub enum Element {
     /// Linear tetrahedra, six to a hexahedral cell.
     Tet4,
+    /// Quadratic tetrahedra, six to a hexahedral cell.
+    Tet10,
     /// Trilinear hexahedra with mean dilatation.
     Hex8,
 }
@@ -136,7 +138,7 @@ impl Element {
     /// Elements that fill one hexahedral cell.
     pub fn per_cell(self) -> usize {
         match self {
-            Element::Tet4 => 6,
+            Element::Tet4 | Element::Tet10 => 6,
             Element::Hex8 => 1,
         }
     }

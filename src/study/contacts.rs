@@ -3,8 +3,8 @@
 use crate::comm::Comm;
 use crate::constraint::{Support, dirichlet};
 use crate::contact::pairing::{self, Rule};
-use crate::contact::surface::GatheredSurface;
-use crate::contact::{ContactError, ContactPair, corner, rigid};
+use crate::contact::surface::{GatheredSurface, dot};
+use crate::contact::{ContactError, ContactPair, corner, quadratic, rigid};
 use crate::decomposition::Decomposition;
 use crate::results::summary::ContactRow;
 use crate::scene::{Contact, Scene, Sides, SurfaceName};
@@ -35,7 +35,10 @@ pub(super) fn pair(
                 (slave, Some(master), pairs, rule_name(rule))
             }
             Sides::Rigid { slave, obstacle } => {
-                (slave, None, rigid::pair(number, name, &gather(slave), obstacle)?, "rigid")
+                let surface = gather(slave);
+                let pairs = rigid::pair(number, name, &surface, obstacle)?;
+                let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);
+                (slave, None, quadratic::conditions(&surface, pairs, along), "rigid")
             }
         };
         found.iter_mut().for_each(|pair| match clearance {

@@ -132,11 +132,13 @@ fn reading_mb(bodies: &[BodyMesh], comm: &dyn Comm) -> Option<f64> {
 
 /// How the scene wants its bodies cut.
 pub(super) fn cut(wanted: &scene::Decomposition, bodies: &[BodyMesh]) -> Cut {
-    let divides =
-        |body: &BodyMesh| body.brick().is_some_and(|b| (0..3).all(|a| b.cells[a] % scene::PAPER_CELLS[a] == 0));
+    // As many nodes as the paper's boxes have.
+    let degree = bodies.iter().map(|body| body.kind.degree()).max().unwrap_or(1);
+    let boxes = scene::PAPER_CELLS.map(|cells| cells / degree);
+    let divides = |body: &BodyMesh| body.brick().is_some_and(|b| (0..3).all(|a| b.cells[a].is_multiple_of(boxes[a])));
     match *wanted {
         scene::Decomposition::Bricks { cells } => Cut::Bricks(cells),
-        scene::Decomposition::Auto if bodies.iter().all(divides) => Cut::Bricks(scene::PAPER_CELLS),
+        scene::Decomposition::Auto if bodies.iter().all(divides) => Cut::Bricks(boxes),
         scene::Decomposition::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
         scene::Decomposition::Metis { subdomains: None } | scene::Decomposition::Auto => {
             let tetrahedra = bodies.iter().map(|b| b.counts().elements * b.kind.tetrahedra()).sum();

@@ -4,6 +4,7 @@ use super::discrete::Discrete;
 use super::sizes::sizes;
 use crate::comm::Comm;
 use crate::constraint::Kind;
+use crate::contact::ContactPair;
 use crate::newton::equilibrium::Unheld;
 use crate::newton::loading::{At, Followed};
 use crate::newton::{self, Solution, StepRecord, TornProblem};
@@ -103,12 +104,12 @@ pub(super) fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
 }
 
 /// Contact of every pair whose row is on this rank.
-pub(super) fn contact_states(problem: &TornProblem, solution: &Solution) -> Vec<ContactState> {
+pub(super) fn contact_states(problem: &TornProblem, pairs: &[ContactPair], solution: &Solution) -> Vec<ContactState> {
     let slack = problem.slack(&solution.u);
     let rows = problem.constraints.rows.iter().zip(&slack).zip(&solution.lambda);
     rows.filter_map(|((row, slack), lambda)| {
         let Kind::Contact { pair } = row.kind else { return None };
-        Some(ContactState { pair, force: row.scale * lambda, gap: slack / row.scale })
+        Some(ContactState { pair, force: row.scale * lambda, gap: slack / (row.scale * pairs[pair].factor()) })
     })
     .collect()
 }

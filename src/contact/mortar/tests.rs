@@ -16,7 +16,13 @@ pub fn grid([n, m]: [usize; 2], first: u64, turned: bool, at: impl Fn(f64, f64) 
     }
     let count = (n + 1) * (m + 1);
     let points = (0..count).map(|k| at((k % (n + 1)) as f64 / n as f64, (k / (n + 1)) as f64 / m as f64)).collect();
-    GatheredSurface { nodes: (0..count as u64).map(|k| first + k).collect(), points, triangles, share: 1.0 }
+    GatheredSurface {
+        nodes: (0..count as u64).map(|k| first + k).collect(),
+        points,
+        triangles,
+        share: 1.0,
+        quadratic: Vec::new(),
+    }
 }
 
 const FREE: [bool; 3] = [false; 3];

@@ -162,6 +162,19 @@ pub enum Problem {
         /// Kind of the first of them.
         kind: &'static str,
     },
+    /// Other cells where quadratic tetrahedra are wanted.
+    #[error(
+        "volume `{volume}` has {cells} {kind} cells, but element = \"tet10\" needs tetrahedra of second order alone: mesh with \
+         `Mesh.ElementOrder = 2;` or `SetOrder 2;` and without `Recombine`, or take another element"
+    )]
+    NoQuadratic {
+        /// Name of the volume.
+        volume: String,
+        /// Cells that are none.
+        cells: u64,
+        /// Kind of the first of them.
+        kind: &'static str,
+    },
     /// Elements without a positive volume.
     #[error(
         "volume `{volume}`: {inverted} of {elements} elements are inverted and {degenerate} have no volume, the first \

@@ -15,6 +15,9 @@ pub struct Kind {
     pub linear: bool,
 }
 
+/// Numbers of the cells of second order that are read: triangle and tetrahedron.
+const QUADRATIC: [i32; 2] = [9, 11];
+
 /// Corners, sides and volumes up to second order, and the common ones beyond (Gmsh reference manual, "MSH file format").
 const KINDS: [Kind; 26] = [
     linear(15, "point", 0, 1),
@@ -54,6 +57,11 @@ const fn curved(number: i32, name: &'static str, dimension: i32, nodes: usize) -
 }
 
 impl Kind {
+    /// Whether cells of this kind can be faces or elements.
+    pub fn is_read(&self) -> bool {
+        self.dimension >= 2 && (self.linear || QUADRATIC.contains(&self.number))
+    }
+
     /// The kind of this number.
     pub fn of(number: i32) -> Option<Self> {
         KINDS.into_iter().find(|kind| kind.number == number)

@@ -61,7 +61,7 @@ pub struct Block {
     pub groups: Vec<i32>,
     /// How many.
     pub cells: u64,
-    /// Nodes of each, as indices into the points; empty unless the kind is linear.
+    /// Nodes of each, as indices into the points; empty unless the kind is one that is read.
     pub nodes: Vec<u32>,
 }
 
@@ -69,7 +69,7 @@ impl Block {
     /// Adds a node to the last cell, if the kind is one that is used.
     fn add_node(&mut self, place: Place, tag: u64, tags: &NodeTags) -> Result<(), Problem> {
         let index = tags.index(tag).ok_or(Problem::NoNode { place, kind: self.kind.name, node: tag })?;
-        if self.kind.linear && self.kind.dimension >= 2 {
+        if self.kind.is_read() {
             self.nodes.push(index);
         }
         Ok(())

@@ -83,7 +83,7 @@ impl Boundary<'_> {
     fn surface(&self, name: &str) -> Result<Surface, Problem> {
         let mut surface = Surface { faces: Vec::new(), all: 0 };
         for block in self.msh.group(2, name) {
-            if !block.kind.linear {
+            if !block.kind.linear && block.kind.nodes != self.mesh.elements.kind().faces()[0].len() {
                 return Err(higher_order(format!("surface `{name}`"), self.msh.group(2, name)));
             }
             let mut add = |face: &[u32]| {
@@ -96,7 +96,7 @@ impl Boundary<'_> {
             for cell in block.nodes.chunks_exact(block.kind.nodes) {
                 match self.mesh.elements.kind() {
                     Kind::Tet4 => split::triangles(cell, |triangle| add(&triangle)),
-                    Kind::Hex8 => add(cell),
+                    Kind::Tet10 | Kind::Hex8 => add(cell),
                 }
             }
         }

@@ -1,9 +1,11 @@
 //! Files that Gmsh wrote (tests/meshes/make.py), and what becomes of them when they are damaged.
 
 use super::*;
+use crate::decomposition::{BodyMesh, Shape, number_bodies};
 use crate::element::{Kind, tet4};
-use crate::mesh::SolidMesh;
+use crate::mesh::brick::indices;
 use crate::mesh::surface::area_vector;
+use crate::mesh::{Brick, Face, SolidMesh};
 
 const TEXT: &[u8] = include_bytes!("../../../tests/meshes/tets-41.msh");
 const BINARY: &[u8] = include_bytes!("../../../tests/meshes/tets-41-binary.msh");
@@ -261,4 +263,71 @@ fn cells_that_cannot_be_computed_with_are_counted() {
     assert_says(&types, &["line ", "type 77", "Mesh.ElementOrder = 1;"]);
     let nodes = version_2(&NAMES, &NODES, &["4 2 1 1 1 2 3 9"]).unwrap_err().to_string();
     assert_says(&nodes, &["line ", "tetrahedron", "node 9"]);
+}
+
+/// A brick of 2 x 2 x 1 cells as a file of elements of this kind, and its upper face.
+fn file_of(kind: Kind) -> (Vec<u8>, BodyMesh) {
+    let brick = Brick { origin: [0.0; 3], size: [2.0, 3.0, 1.0], cells: [2, 2, 1] };
+    let body = number_bodies([(kind, Shape::Brick(brick))]).remove(0);
+    let lattice = body.lattice().expect("it is a brick");
+    let places: Vec<_> = indices(&lattice.all_nodes()).map(|at| lattice.coordinates(at)).collect();
+    let (of_volume, of_face) = if kind == Kind::Hex8 { (5, 3) } else { (11, 9) };
+    let mut cells = Vec::new();
+    for element in 0..body.counts().elements {
+        let nodes = body.element(element);
+        for face in kind.faces() {
+            let nodes: Vec<u64> = face.iter().map(|&k| nodes[k]).collect();
+            if nodes.iter().all(|&n| lattice.is_on(Face::ZMax, lattice.node_position(n))) {
+                cells.push((of_face, 7, nodes));
+            }
+        }
+        let mut nodes = nodes;
+        if kind == Kind::Tet10 {
+            nodes.swap(8, 9);
+        }
+        cells.push((of_volume, 1, nodes));
+    }
+    let mut text =
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 7 \"top\"\n3 1 \"block\"\n$EndPhysicalNames\n"
+            .to_owned();
+    text += &format!("$Nodes\n{}\n", places.len());
+    (1..).zip(&places).for_each(|(n, [x, y, z])| text += &format!("{n} {x} {y} {z}\n"));
+    text += &format!("$EndNodes\n$Elements\n{}\n", cells.len());
+    for (number, (kind, group, nodes)) in (1..).zip(&cells) {
+        let nodes: Vec<String> = nodes.iter().map(|n| (n + 1).to_string()).collect();
+        text += &format!("{number} {kind} 2 {group} {group} {}\n", nodes.join(" "));
+    }
+    (format!("{text}$EndElements\n").into_bytes(), body)
+}
+
+#[test]
+fn hexahedra_and_quadratic_tetrahedra_are_kept_for_the_elements_that_are_made_of_them() {
+    for kind in [Kind::Hex8, Kind::Tet10] {
+        let (text, body) = file_of(kind);
+        let mesh = parse(&text).unwrap().volume(None, &["top"], kind).unwrap();
+        assert_eq!(mesh.elements.kind(), kind);
+        let expected: Vec<u32> =
+            (0..body.counts().elements).flat_map(|e| body.element(e)).map(|node| node as u32).collect();
+        assert_eq!(mesh.elements.nodes(), expected);
+        let mut sum = [0.0; 3];
+        for face in mesh.surface("top") {
+            let places: Vec<_> = face.iter().map(|&n| mesh.points[n as usize]).collect();
+            crate::mesh::surface::shares(&places).iter().for_each(|s| (0..3).for_each(|i| sum[i] += s[i]));
+        }
+        assert!(sum[0].abs() + sum[1].abs() + (sum[2] - 6.0).abs() < 1e-13, "{kind:?}: {sum:?}");
+    }
+}
+
+#[test]
+fn other_cells_are_refused_for_them() {
+    let of =
+        |text: &[u8], kind| parse(text).unwrap().volume(None, &[], kind).expect_err("should be refused").to_string();
+    let (hexahedra, quadratic) = (file_of(Kind::Hex8).0, file_of(Kind::Tet10).0);
+    let assert_says = |text: String, parts: &[&str]| {
+        parts.iter().for_each(|part| assert!(text.contains(part), "`{part}` is not in: {text}"));
+    };
+    assert_says(of(HEXAHEDRA, Kind::Hex8), &["54 prism cells", "hex8"]);
+    assert_says(of(&quadratic, Kind::Hex8), &["24 10-node tetrahedron cells", "first-order"]);
+    assert_says(of(&hexahedra, Kind::Tet10), &["4 hexahedron cells", "tet10", "Mesh.ElementOrder = 2"]);
+    assert_says(of(&quadratic, Kind::Tet4), &["24 10-node tetrahedron cells", "first-order"]);
 }

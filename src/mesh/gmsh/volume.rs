@@ -19,13 +19,7 @@ impl Msh {
     pub fn volume(&self, volume: Option<&str>, surfaces: &[&str], kind: Kind) -> Result<SolidMesh, Problem> {
         self.refuse_untagged()?;
         let volume = &self.choose(volume)?;
-        let mut blocks = Vec::new();
-        for block in self.group(3, volume) {
-            if !block.kind.linear {
-                return Err(higher_order(format!("volume `{volume}`"), self.group(3, volume)));
-            }
-            blocks.push(block);
-        }
+        let blocks: Vec<&Block> = self.group(3, volume).collect();
         refuse_others(volume, kind, &blocks)?;
 
         let mut index = vec![u32::MAX; self.points.len()];
@@ -41,6 +35,8 @@ impl Msh {
             for cell in block.nodes.chunks_exact(block.kind.nodes) {
                 match kind {
                     Kind::Tet4 => split::tetrahedra(cell, |tet| nodes.extend(tet.map(|n| index[n as usize]))),
+                    // Gmsh has the last two middles the other way round.
+                    Kind::Tet10 => nodes.extend([0, 1, 2, 3, 4, 5, 6, 7, 9, 8].map(|k| index[cell[k] as usize])),
                     Kind::Hex8 => nodes.extend(cell.iter().map(|&n| index[n as usize])),
                 }
             }
@@ -132,11 +128,19 @@ fn check_elements(volume: &str, mesh: &SolidMesh) -> Result<(), Problem> {
 
 /// Refuses cells that the kind of element cannot be made of.
 fn refuse_others(volume: &str, kind: Kind, blocks: &[&Block]) -> Result<(), Problem> {
-    let fits = |block: &&&Block| kind == Kind::Tet4 || block.kind.nodes == kind.nodes();
-    let others: Vec<_> = blocks.iter().filter(|block| !fits(block)).collect();
+    let fits = |block: &Block| match kind {
+        Kind::Tet4 => block.kind.linear,
+        Kind::Tet10 | Kind::Hex8 => block.kind.dimension == 3 && block.kind.nodes == kind.nodes(),
+    };
+    let others: Vec<&&Block> = blocks.iter().filter(|block| !fits(block)).collect();
     let Some(first) = others.first() else { return Ok(()) };
     let cells = others.iter().map(|block| block.cells).sum();
-    Err(Problem::NoHexahedra { volume: volume.to_owned(), cells, kind: first.kind.name })
+    let (volume, found) = (volume.to_owned(), first.kind.name);
+    Err(match kind {
+        Kind::Hex8 if first.kind.linear => Problem::NoHexahedra { volume, cells, kind: found },
+        Kind::Tet10 => Problem::NoQuadratic { volume, cells, kind: found },
+        Kind::Tet4 | Kind::Hex8 => higher_order(format!("volume `{volume}`"), blocks.iter().copied()),
+    })
 }
 
 /// Cells of higher order, counted.

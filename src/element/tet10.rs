@@ -1,0 +1,128 @@
+//! The quadratic tetrahedron: corners 0..4 as those of the linear one, then the middles of the edges 01, 12, 20, 03, 13, 23
+//! (the order of VTK). Four Gauss points of degree two: exact for straight edges, and no motion but the rigid ones is
+//! free, as 4 x 6 strains and 6 motions make 30 unknowns. Edges may be curved; the map is that of the displacement.
+
+use super::{DEGENERATE, Nodal, Point, map};
+
+/// Corners of each edge, by its middle node less 4.
+pub const EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)];
+
+/// Barycentric coordinates of the Gauss points: one is near each corner (Hammer, Marlowe and Stroud 1956).
+const NEAR: f64 = 0.585_410_196_624_968_5;
+const FAR: f64 = 0.138_196_601_125_010_5;
+
+/// Values of the shape functions at barycentric coordinates.
+pub fn values(at: [f64; 4]) -> [f64; 10] {
+    let mut values = [0.0; 10];
+    (0..4).for_each(|a| values[a] = at[a] * (2.0 * at[a] - 1.0));
+    EDGES.iter().zip(&mut values[4..]).for_each(|(&(a, b), value)| *value = 4.0 * at[a] * at[b]);
+    values
+}
+
+/// Values of the shape functions at the integration points.
+pub fn values_at_points() -> [[f64; 10]; 4] {
+    std::array::from_fn(|near| values(place(near)))
+}
+
+/// Barycentric coordinates of the Gauss point near a corner.
+fn place(near: usize) -> [f64; 4] {
+    std::array::from_fn(|a| if a == near { NEAR } else { FAR })
+}
+
+/// The integration points, and `None` if the [`shape`] is [`DEGENERATE`].
+#[inline]
+pub fn points(nodes: &Nodal<10>) -> Option<[Point<10>; 4]> {
+    (shape(nodes) > DEGENERATE).then(|| {
+        std::array::from_fn(|near| {
+            let point = at(nodes, &place(near));
+            Point { weight: point.weight / 24.0, ..point }
+        })
+    })
+}
+
+/// A point of unit weight in the reference tetrahedron, at barycentric coordinates.
+#[inline]
+pub fn at(nodes: &Nodal<10>, place: &[f64; 4]) -> Point<10> {
+    let (determinant, gradients) = map::gradients(nodes, &derivatives(place));
+    Point { weight: determinant, gradients, dilatation: None }
+}
+
+/// Derivatives of the shape functions by the barycentric coordinates of corners 1, 2, 3.
+#[inline]
+fn derivatives(at: &[f64; 4]) -> Nodal<10> {
+    // Of each coordinate by those three.
+    const SLOPES: [[f64; 3]; 4] = [[-1.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut derivatives = [[0.0; 3]; 10];
+    for k in 0..3 {
+        (0..4).for_each(|a| derivatives[a][k] = (4.0 * at[a] - 1.0) * SLOPES[a][k]);
+        for (&(a, b), derivative) in EDGES.iter().zip(&mut derivatives[4..]) {
+            derivative[k] = 4.0 * (at[a] * SLOPES[b][k] + at[b] * SLOPES[a][k]);
+        }
+    }
+    derivatives
+}
+
+/// Least determinant of the map from the reference tetrahedron at nodes and Gauss points, over the cube of the longest
+/// distance of corners, times the root of two: 1 for the regular tetrahedron, negative if it is turned inside out somewhere.
+pub fn shape(nodes: &Nodal<10>) -> f64 {
+    let mut longest = 0.0_f64;
+    for (a, b) in EDGES {
+        longest = longest.max((0..3).map(|i| (nodes[a][i] - nodes[b][i]).powi(2)).sum());
+    }
+    let corner = |a: usize| std::array::from_fn(|b| f64::from(a == b));
+    let middle = |(a, b): (usize, usize)| std::array::from_fn(|c| if c == a || c == b { 0.5 } else { 0.0 });
+    let gauss = |near: usize| std::array::from_fn(|a| if a == near { NEAR } else { FAR });
+    let places = (0..4).map(corner).chain(EDGES.map(middle)).chain((0..4).map(gauss));
+    let least = places.map(|at| map::determinant(nodes, &derivatives(&at))).fold(f64::INFINITY, f64::min);
+    std::f64::consts::SQRT_2 * least / (longest * longest.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::tet4;
+
+    fn straight(corners: &Nodal<4>) -> Nodal<10> {
+        let middle = |(a, b): (usize, usize)| std::array::from_fn(|i| 0.5 * (corners[a][i] + corners[b][i]));
+        let middles = EDGES.map(middle);
+        std::array::from_fn(|a| if a < 4 { corners[a] } else { middles[a - 4] })
+    }
+
+    const CORNERS: Nodal<4> = [[0.1, 0.0, 0.2], [2.0, 0.3, 0.0], [0.4, 1.5, 0.1], [0.2, 0.5, 1.0]];
+
+    #[test]
+    fn with_straight_edges_it_has_volume_and_shape_of_the_linear_one() {
+        let nodes = straight(&CORNERS);
+        let [linear] = tet4::points(&CORNERS).expect("it has a volume");
+        let points = points(&nodes).expect("it has a volume");
+        assert!(points.iter().all(|p| (p.weight - linear.weight / 4.0).abs() < 1e-15));
+        assert!((shape(&nodes) - tet4::shape(&CORNERS)).abs() < 1e-14);
+    }
+
+    /// The gradient of a quadratic function at each Gauss point.
+    #[test]
+    fn gradients_of_quadratic_functions_are_exact() {
+        let nodes = straight(&CORNERS);
+        let function = |[x, y, z]: [f64; 3]| x * x - 2.0 * x * y + 0.5 * z * z + y * z - x;
+        let gradient = |[x, y, z]: [f64; 3]| [2.0 * x - 2.0 * y - 1.0, z - 2.0 * x, z + y];
+        for (near, point) in points(&nodes).expect("it has a volume").iter().enumerate() {
+            let values = values(std::array::from_fn(|a| if a == near { NEAR } else { FAR }));
+            let place = std::array::from_fn(|i| (0..10).map(|a| values[a] * nodes[a][i]).sum());
+            let expected = gradient(place);
+            for i in 0..3 {
+                let found: f64 = (0..10).map(|a| point.gradients[a][i] * function(nodes[a])).sum();
+                assert!((found - expected[i]).abs() < 1e-13, "{found} {expected:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_middle_too_far_off_or_inverted_corners_are_refused() {
+        let mut bent = straight(&CORNERS);
+        bent[4] = std::array::from_fn(|i| 0.9 * CORNERS[1][i] + 0.1 * CORNERS[0][i]);
+        let [a, b, c, d] = CORNERS;
+        for nodes in [bent, straight(&[a, c, b, d]), straight(&[a, b, c, a])] {
+            assert_eq!(points(&nodes), None);
+        }
+    }
+}
