@@ -5,7 +5,7 @@ mod common;
 
 use std::fs;
 
-use common::{EARLIER, assert_refused, assert_scene_refused, run, scene_file};
+use common::{EARLIER, assert_refused, assert_scene_refused, run_briefly, scene_file};
 
 const USAGE: i32 = 64;
 const BAD_SCENE: i32 = 65;
@@ -141,12 +141,12 @@ fn a_place_that_cannot_be_written_is_refused_before_anything_is_solved() {
     fs::write(&file, EARLIER).unwrap();
     for ranks in [1, 2] {
         for out in [file.join("below").to_str().unwrap(), "/proc/fetiplast"] {
-            let refused = run(ranks, &["solve", "patch", "--out", out]);
+            let refused = run_briefly(ranks, &["solve", "patch", "--out", out]);
             assert_refused(&refused, INPUT_OUTPUT, &[out, "cannot write"]);
             assert!(!refused.stdout.contains("criterion"), "nothing was solved: {}", refused.stdout);
         }
         let summary = file.join("summary.json");
-        let refused = run(ranks, &["check", "patch", "--summary", summary.to_str().unwrap()]);
+        let refused = run_briefly(ranks, &["check", "patch", "--summary", summary.to_str().unwrap()]);
         assert_refused(&refused, INPUT_OUTPUT, &["summary.json", "cannot write"]);
         assert_eq!(fs::read_to_string(&file).unwrap(), EARLIER);
     }
@@ -155,10 +155,10 @@ fn a_place_that_cannot_be_written_is_refused_before_anything_is_solved() {
 #[test]
 fn a_wrong_command_line_is_a_usage_error() {
     for ranks in [1, 2] {
-        assert_refused(&run(ranks, &["solve", "patch", "--fast"]), USAGE, &["--fast"]);
-        assert_refused(&run(ranks, &["slove"]), USAGE, &["slove"]);
-        assert_refused(&run(ranks, &["solve", "patch", "--level", "two"]), USAGE, &["--level", "two"]);
-        assert_refused(&run(ranks, &["show", "nothing"]), USAGE, &["nothing", "two-blocks"]);
+        assert_refused(&run_briefly(ranks, &["solve", "patch", "--fast"]), USAGE, &["--fast"]);
+        assert_refused(&run_briefly(ranks, &["slove"]), USAGE, &["slove"]);
+        assert_refused(&run_briefly(ranks, &["solve", "patch", "--level", "two"]), USAGE, &["--level", "two"]);
+        assert_refused(&run_briefly(ranks, &["show", "nothing"]), USAGE, &["nothing", "two-blocks"]);
     }
 }
 

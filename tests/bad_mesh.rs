@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use common::msh::{Form, write};
-use common::{assert_refused, assert_scene_refused, run, scene_file};
+use common::{assert_refused, assert_scene_refused, run_briefly, scene_file};
 use fetiplast::mesh::Brick;
 
 const BAD: i32 = 65;
@@ -242,7 +242,7 @@ fn levels_are_for_bricks() {
     let scene = scene_file(directory.path(), SCENE);
     for ranks in [1, 2] {
         let parts = ["level 2", "body above", "gmsh -refine"];
-        assert_refused(&run(ranks, &["check", &scene, "--level", "2"]), BAD, &parts);
+        assert_refused(&run_briefly(ranks, &["check", &scene, "--level", "2"]), BAD, &parts);
     }
     assert!(Path::new(&scene).exists());
 }

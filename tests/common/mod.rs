@@ -106,6 +106,11 @@ pub fn run(ranks: usize, arguments: &[&str]) -> Run {
     launch(ranks, arguments, tempfile::tempdir().unwrap())
 }
 
+/// As [`run`], for runs that end before they solve anything: most of their time they wait for processes to start.
+pub fn run_briefly(ranks: usize, arguments: &[&str]) -> Run {
+    launch_beside_others(ranks, arguments, tempfile::tempdir().unwrap())
+}
+
 /// Writes a scene file of this text to a directory.
 pub fn scene_file(directory: &Path, text: &str) -> String {
     let path = directory.join("scene.toml");
@@ -113,9 +118,14 @@ pub fn scene_file(directory: &Path, text: &str) -> String {
     path.to_str().unwrap().to_owned()
 }
 
+/// One of these runs at a time: others would take the cores that it counts on.
 fn launch(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
     // A failed test poisons the lock, which guards no data.
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    launch_beside_others(ranks, arguments, directory)
+}
+
+fn launch_beside_others(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
     let program = env!("CARGO_BIN_EXE_fetiplast");
     let mut command = if ranks == 1 { Command::new(program) } else { Command::new("mpirun") };
     if ranks > 1 {
@@ -223,7 +233,7 @@ pub fn assert_scene_refused(scene: &str, sets: &[&str], code: i32, parts: &[&str
         fs::write(&summary, EARLIER).unwrap();
         let mut arguments = vec!["solve", scene, "--out", out.path().to_str().unwrap()];
         arguments.extend(sets.iter().flat_map(|set| ["--set", set]));
-        assert_refused(&run(ranks, &arguments), code, parts);
+        assert_refused(&run_briefly(ranks, &arguments), code, parts);
         assert_eq!(fs::read_to_string(&result).unwrap(), EARLIER);
         assert_eq!(fs::read_to_string(&summary).unwrap(), EARLIER);
         assert_eq!(fs::read_dir(out.path()).unwrap().count(), 2, "no other files appear");
