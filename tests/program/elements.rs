@@ -1,8 +1,6 @@
 //! What elements can do beyond homogeneous states: bending of nearly incompressible bodies, the benchmark.
 
-mod common;
-
-use common::{assert_close, assert_residuals, number, scene_file, solve, solve_with};
+use crate::common::{assert_close, assert_residuals, number, scene_file, solve, solve_with};
 
 /// Deflection of a cantilever in plane strain under a shear traction at its end, over that of beam theory. Its height is 1.
 fn deflection(element: &str, cells: [usize; 2], poisson: f64) -> f64 {

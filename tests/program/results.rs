@@ -1,12 +1,10 @@
 //! What a run leaves behind: a result file that other programs read, and a summary with the keys that scripts rely on.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::fields::Fields;
-use common::{Run, check, solve};
+use crate::common::fields::Fields;
+use crate::common::{Run, check, solve};
 use serde_json::Value;
 
 fn can_read(python: &Path) -> bool {
@@ -114,12 +112,12 @@ fn assert_contract(summary: &Value) {
     assert_eq!(summary["scene"], "patch");
     assert_eq!(summary["error"], Value::Null);
     assert_eq!((&summary["level"], &summary["ranks"]), (&1.into(), &2.into()));
-    common::vector(&summary["contact_force"]);
+    crate::common::vector(&summary["contact_force"]);
     let reactions = summary["reactions"].as_object().unwrap();
     let supports: Vec<&String> = reactions.keys().collect();
     assert_eq!(supports, ["bottom", "lower-back", "lower-side", "top", "upper-back", "upper-side"]);
     reactions.values().for_each(|reaction| {
-        common::vector(reaction);
+        crate::common::vector(reaction);
     });
     let time = summary["time"].as_object().unwrap();
     assert!(time.len() > 3 && time.values().all(Value::is_number), "{time:?}");

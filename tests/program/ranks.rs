@@ -1,11 +1,9 @@
 //! The same scene gives bitwise the same summary and fields for every number of ranks: subdomains belong to the scene,
 //! and sums are formed in their order. Ranks beyond the number of subdomains stay idle.
 
-mod common;
-
-use common::fields::Fields;
-use common::msh::{Form, write};
-use common::{Run, scene_file, solve};
+use crate::common::fields::Fields;
+use crate::common::msh::{Form, write};
+use crate::common::{Run, scene_file, solve};
 use fetiplast::mesh::Brick;
 use serde_json::{Map, Value};
 

@@ -1,9 +1,7 @@
 //! Bodies that only contact holds: solved where loads press them against it, refused with the free motion where not.
 
-mod common;
-
-use common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
-use common::{assert_close, assert_scene_refused, number, scene_file, solve, solve_tightly, vector};
+use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
+use crate::common::{assert_close, assert_scene_refused, number, scene_file, solve, solve_tightly, vector};
 use serde_json::Value;
 
 const YOUNG: f64 = 210_000.0;

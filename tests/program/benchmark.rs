@@ -1,12 +1,10 @@
 //! The paper's benchmark: sizes of its Table 2, and solutions against those of an independent monolithic solver.
 
-mod common;
-
 use std::fs;
 use std::path::PathBuf;
 
-use common::fields::Fields;
-use common::{Run, assert_close, assert_near, assert_residuals, check, number, solve, solve_level, vector};
+use crate::common::fields::Fields;
+use crate::common::{Run, assert_close, assert_near, assert_residuals, check, number, solve, solve_level, vector};
 use serde_json::Value;
 
 /// Hessian multiplications that the paper reports at level 1.

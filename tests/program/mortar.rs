@@ -1,9 +1,7 @@
 //! Contact of meshes that do not match beyond homogeneous states: balance of forces where contact meets supports, and
 //! agreement with meshes that match.
 
-mod common;
-
-use common::{assert_close, assert_residuals, number, scene_file, solve_tightly, vector};
+use crate::common::{assert_close, assert_residuals, number, scene_file, solve_tightly, vector};
 use serde_json::Value;
 
 /// A block on a larger one, pressed down and held at one side, down to the contact, where that side moves down too. The

@@ -1,9 +1,7 @@
 //! Scenes that are hard for the method: near incompressibility, perfect plasticity, jumps of stiffness, degenerate
 //! contact, bodies that only contact holds, decompositions into shreds or into whole bodies.
 
-mod common;
-
-use common::{Run, assert_close, assert_near, assert_residuals, number, scene_file, solve, vector};
+use crate::common::{Run, assert_close, assert_near, assert_residuals, number, scene_file, solve, vector};
 use serde_json::Value;
 
 const RANKS: usize = 2;
@@ -113,7 +111,7 @@ fn contact_that_opens_everywhere_transmits_no_force() {
 
 /// The contact patch with a load on the upper block instead of its support: only contact holds it vertically.
 fn pressed(traction: f64, sets: &[&str]) -> Run {
-    let text = include_str!("../src/scene/library/patch.toml");
+    let text = include_str!("../../src/scene/library/patch.toml");
     let support = "[support.top]\nsurface = \"upper.zmax\"\nfix = [\"z\"]\ndisplacement = [0.0, 0.0, -3.0]\n";
     assert!(text.contains(support));
     let load = format!("[load.top]\nsurface = \"upper.zmax\"\ntraction = [0.0, 0.0, {traction:?}]\n");

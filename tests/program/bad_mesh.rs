@@ -1,13 +1,11 @@
 //! A corpus of bad mesh files and scenes with them: each ends with one message that says what is wrong and how to mend
 //! it, on every rank, and earlier results stay as they were.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::msh::{Form, write};
-use common::{assert_refused, assert_scene_refused, run_briefly, scene_file};
+use crate::common::msh::{Form, write};
+use crate::common::{assert_refused, assert_scene_refused, run_briefly, scene_file};
 use fetiplast::mesh::Brick;
 
 const BAD: i32 = 65;
@@ -95,7 +93,7 @@ fn the_scene_itself_is_sound() {
     let directory = tempfile::tempdir().unwrap();
     for form in [Form::Text41, Form::Binary22] {
         fs::write(directory.path().join("two.msh"), bytes(form)).unwrap();
-        let run = common::solve(2, &scene_file(directory.path(), SCENE), &[]).converged();
+        let run = crate::common::solve(2, &scene_file(directory.path(), SCENE), &[]).converged();
         assert_eq!((run.summary()["nodes"].as_u64(), run.summary()["elements"].as_u64()), (Some(36), Some(48)));
     }
 }

@@ -2,10 +2,8 @@
 //! contact, in several subdomains on 2 ranks. Expected values are closed forms: the tensor of strain is
 //! `sigma/E + kappa` along a uniaxial stress and `-nu sigma/E - kappa/2` across it, `kappa = (q - sigma_y)/H`.
 
-mod common;
-
-use common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
-use common::{Run, assert_close, number, solve, solve_tightly, vector};
+use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
+use crate::common::{Run, assert_close, number, solve, solve_tightly, vector};
 
 const YOUNG: f64 = 210_000.0;
 const POISSON: f64 = 0.29;

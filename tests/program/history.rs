@@ -1,10 +1,8 @@
 //! Load histories: loading, unloading, reloading of homogeneous states against their closed form, residual states of
 //! bodies in contact, increments that are cut back, and the series of results.
 
-mod common;
-
-use common::fields::Fields;
-use common::{Run, assert_close, assert_residuals, number, solve, vector};
+use crate::common::fields::Fields;
+use crate::common::{Run, assert_close, assert_residuals, number, solve, vector};
 use fetiplast::analytic::cycle::Cycle;
 use fetiplast::material::Material;
 use serde_json::Value;

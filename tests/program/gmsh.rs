@@ -1,13 +1,11 @@
 //! Bodies from mesh files: the benchmark's bricks written as files give the bricks' solution, for every number of
 //! subdomains and ranks; meshes of Gmsh itself pass a patch test.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::msh::{Form, write};
-use common::{assert_close, assert_near, check, number, scene_file, solve, vector};
+use crate::common::msh::{Form, write};
+use crate::common::{assert_close, assert_near, check, number, scene_file, solve, vector};
 use fetiplast::mesh::Brick;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -23,7 +21,7 @@ const UPPER: Brick = Brick { origin: [600.0, 0.0, 1000.0], ..LOWER };
 
 /// The benchmark's scene with these bodies instead of its bricks, in a directory with this mesh file.
 fn two_blocks(mesh: &[u8], lower: &str, upper: &str) -> (TempDir, String) {
-    let text = include_str!("../src/scene/library/two-blocks.toml");
+    let text = include_str!("../../src/scene/library/two-blocks.toml");
     let mut bodies = [lower, upper].into_iter();
     let line = |line: &str| match line {
         _ if line.starts_with("brick =") => {
@@ -100,7 +98,7 @@ fn bricks_and_files_go_together_and_nobody_need_name_subdomains() {
     let mesh = write(&[("only", UPPER)], Form::Text41);
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("upper.msh"), mesh).unwrap();
-    let text = include_str!("../src/scene/library/two-blocks.toml");
+    let text = include_str!("../../src/scene/library/two-blocks.toml");
     let (head, tail) = text.split_once("[decomposition]").unwrap();
     let brick = "brick = { origin = [600.0, 0.0, 1000.0], size = [3000.0, 1000.0, 1000.0], cells = [30, 10, 10] }";
     assert!(head.contains(brick));

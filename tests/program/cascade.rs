@@ -1,8 +1,6 @@
 //! A start from coarser levels saves work and changes nothing else.
 
-mod common;
-
-use common::{assert_close, assert_residuals, number, solve_level, solve_with};
+use crate::common::{assert_close, assert_residuals, number, solve_level, solve_with};
 use serde_json::Value;
 
 /// The benchmark with cells twice as large.

@@ -1,11 +1,9 @@
 //! Bad input: one message that names what is wrong and what is allowed, the right exit code, on 1 and on 2 ranks, and
 //! earlier results stay as they were.
 
-mod common;
-
 use std::fs;
 
-use common::{EARLIER, assert_refused, assert_scene_refused, run_briefly, scene_file};
+use crate::common::{EARLIER, assert_refused, assert_scene_refused, run_briefly, scene_file};
 
 const USAGE: i32 = 64;
 const BAD_SCENE: i32 = 65;
@@ -19,7 +17,7 @@ fn assert_override_refused(set: &str, parts: &[&str]) {
 /// The built-in scene `patch` as a file, with `from` replaced by `to`.
 #[track_caller]
 fn assert_text_refused(from: &str, to: &str, parts: &[&str]) {
-    let text = include_str!("../src/scene/library/patch.toml");
+    let text = include_str!("../../src/scene/library/patch.toml");
     assert!(text.contains(from));
     let directory = tempfile::tempdir().unwrap();
     let file = scene_file(directory.path(), &text.replace(from, to));
@@ -98,7 +96,7 @@ fn obstacles_that_make_no_sense_are_refused() {
 
 #[test]
 fn a_body_that_nothing_holds_is_named_with_its_free_motions() {
-    let text = include_str!("../src/scene/library/bar.toml").replace("fix = [\"z\"]", "fix = [\"y\"]");
+    let text = include_str!("../../src/scene/library/bar.toml").replace("fix = [\"z\"]", "fix = [\"y\"]");
     let directory = tempfile::tempdir().unwrap();
     let file = scene_file(directory.path(), &text);
     assert_scene_refused(&file, &[], BAD_SCENE, &["body.bar", "translation along z", "add supports"]);
@@ -165,7 +163,7 @@ fn a_wrong_command_line_is_a_usage_error() {
 /// A run that cannot converge says so and writes what it has.
 fn assert_outcome(set: &str, reason: &str) {
     for ranks in [1, 2] {
-        let run = common::solve(ranks, "bar", &[set]);
+        let run = crate::common::solve(ranks, "bar", &[set]);
         assert_eq!(run.code, 1, "{}{}", run.stdout, run.stderr);
         assert!(!run.stderr.contains("panicked"), "{}", run.stderr);
         let summary = run.summary();

@@ -1,10 +1,8 @@
 //! Two nested hollow spheres from a mesh file, with interfaces that do not match: against the closed form on two meshes, and
 //! the same on every cut. That they are the same on any number of ranks is in `ranks.rs`.
 
-mod common;
-
-use common::fields::Fields;
-use common::{Run, assert_close, assert_near, number, solve, vector};
+use crate::common::fields::Fields;
+use crate::common::{Run, assert_close, assert_near, number, solve, vector};
 use fetiplast::analytic::hollow_sphere::HollowSphere;
 use fetiplast::analytic::nested_spheres::NestedSpheres;
 use fetiplast::material::Material;

@@ -1,8 +1,6 @@
 //! Pressure and body force against what a traction does, and against closed forms that linear elements meet exactly.
 
-mod common;
-
-use common::{assert_close, assert_near, number, solve_tightly, vector};
+use crate::common::{assert_close, assert_near, number, solve_tightly, vector};
 use serde_json::Value;
 
 const RANKS: usize = 2;

@@ -1,8 +1,6 @@
 //! Runs the program as a user would, under `mpirun` for more than one rank, with a time limit, and reads back what it
 //! wrote.
 
-#![allow(dead_code, reason = "every test binary compiles this module and uses part of it")]
-
 pub mod fields;
 pub mod msh;
 
@@ -101,12 +99,8 @@ fn scene_command(
     launch(ranks, &arguments, directory)
 }
 
-/// Runs the program with these arguments.
-pub fn run(ranks: usize, arguments: &[&str]) -> Run {
-    launch(ranks, arguments, tempfile::tempdir().unwrap())
-}
-
-/// As [`run`], for runs that end before they solve anything: most of their time they wait for processes to start.
+/// Runs the program with these arguments. For runs that end before they solve anything: most of their time they wait
+/// for processes to start.
 pub fn run_briefly(ranks: usize, arguments: &[&str]) -> Run {
     launch_beside_others(ranks, arguments, tempfile::tempdir().unwrap())
 }

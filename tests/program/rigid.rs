@@ -1,10 +1,8 @@
 //! Contact with rigid obstacles: homogeneous states against closed forms, balance of forces, and the force of a ball
 //! against published numbers.
 
-mod common;
-
-use common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
-use common::{assert_close, assert_near, assert_residuals, scene_file, solve, solve_tightly, vector};
+use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
+use crate::common::{assert_close, assert_near, assert_residuals, scene_file, solve, solve_tightly, vector};
 
 const YOUNG: f64 = 210_000.0;
 const POISSON: f64 = 0.29;

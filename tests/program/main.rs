@@ -1,0 +1,20 @@
+//! Tests of the whole program as users run it, alone and under `mpirun`. One binary, so that linking is paid once and
+//! short runs fill the gaps between long ones.
+
+mod bad_input;
+mod bad_mesh;
+mod benchmark;
+mod cascade;
+mod common;
+mod elements;
+mod gmsh;
+mod hard;
+mod held;
+mod history;
+mod loads;
+mod mortar;
+mod patch;
+mod ranks;
+mod results;
+mod rigid;
+mod ring;
