@@ -156,9 +156,8 @@ pub fn solve(
         space: &space,
         yields: discrete.materials.iter().any(|m| m.yield_stress.is_some()),
     };
-    let resultants = |stage: &loading::Stage| recover::resultants(&problem, &coarse, &stage.end.loads);
-    let ends: Vec<Vec<f64>> = stages.iter().map(resultants).collect();
-    equilibrium::check(&coarse, &space, constraints, &ends)
+    let resultants = |stage: usize| recover::resultants(&problem, &coarse, &stages[stage].end.loads);
+    equilibrium::check(&coarse, &space, constraints, stages.len(), resultants)
         .map_err(|unheld| StudyError::Unheld(report::unheld(scene, &unheld)))?;
     timer.time("coarse set-up", || coarse.factorise())?;
     let solver = &scene.solver;

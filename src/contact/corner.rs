@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::surface::dot;
+use super::surface::{difference, dot, unit};
 use super::{ContactError, ContactPair};
 
 /// Distance of a unit vector to the others or to their span from which a direction counts as independent.
@@ -68,13 +68,8 @@ fn rank(directions: &[[f64; 3]]) -> usize {
 
 /// Length between the tips of two unit vectors.
 fn chord(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let difference: [f64; 3] = std::array::from_fn(|axis| a[axis] - b[axis]);
-    dot(difference, difference).sqrt()
-}
-
-fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
-    let length = dot(v, v).sqrt();
-    (length > f64::from(f32::MIN_POSITIVE)).then(|| v.map(|v| v / length))
+    let between = difference(a, b);
+    dot(between, between).sqrt()
 }
 
 #[cfg(test)]

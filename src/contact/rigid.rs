@@ -8,7 +8,7 @@
 //! A node whose surface looks away from the obstacle (`n` against its outward normal) cannot touch it from its own side and
 //! carries no condition, nor does a node beside a height field.
 
-use super::surface::{GatheredSurface, difference, dot};
+use super::surface::{GatheredSurface, difference, dot, unit};
 use super::{ContactError, ContactPair};
 use crate::scene::Obstacle;
 
@@ -92,17 +92,6 @@ fn bilinear(at: [f64; 2], heights: &[Vec<f64>]) -> Option<(f64, [f64; 2])> {
     let along = [high[j] - low[j], high[j + 1] - low[j + 1]];
     let [first, last] = [low[j] + s * along[0], low[j + 1] + s * along[1]];
     Some((first + t * (last - first), [along[0] + t * (along[1] - along[0]), last - first]))
-}
-
-/// The vector over its length, whatever that is.
-fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
-    let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    if largest < f64::EPSILON {
-        return None;
-    }
-    let v = v.map(|x| x / largest);
-    let length = dot(v, v).sqrt();
-    Some(v.map(|x| x / length))
 }
 
 #[cfg(test)]

@@ -126,6 +126,17 @@ pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// The vector over its length, whatever that is.
+pub fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+    let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    if largest < f64::EPSILON {
+        return None;
+    }
+    let v = v.map(|x| x / largest);
+    let length = dot(v, v).sqrt();
+    Some(v.map(|x| x / length))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

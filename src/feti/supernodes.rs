@@ -42,65 +42,42 @@ pub(super) trait Number:
     fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [Self::Vector<S>];
 }
 
-impl Number for f32 {
-    type Vector<S: Simd> = S::f32s;
+macro_rules! number {
+    ($number:ty, $vector:ident, $lanes:ident, $splat:ident, $mul_add:ident, $as_simd:ident, $as_mut_simd:ident) => {
+        impl Number for $number {
+            type Vector<S: Simd> = S::$vector;
 
-    #[inline(always)]
-    fn fused(self, a: Self, b: Self) -> Self {
-        self.mul_add(a, b)
-    }
+            #[inline(always)]
+            fn fused(self, a: Self, b: Self) -> Self {
+                self.mul_add(a, b)
+            }
 
-    #[inline(always)]
-    fn all<S: Simd>(self, simd: S) -> S::f32s {
-        simd.splat_f32s(self)
-    }
+            #[inline(always)]
+            fn all<S: Simd>(self, simd: S) -> S::$vector {
+                simd.$splat(self)
+            }
 
-    #[inline(always)]
-    fn add_product<S: Simd>(simd: S, x: S::f32s, y: S::f32s, z: S::f32s) -> S::f32s {
-        simd.mul_add_f32s(x, y, z)
-    }
+            #[inline(always)]
+            fn add_product<S: Simd>(simd: S, x: S::$vector, y: S::$vector, z: S::$vector) -> S::$vector {
+                simd.$mul_add(x, y, z)
+            }
 
-    #[inline(always)]
-    fn parts<S: Simd>(x: &Wide<Self>) -> &[S::f32s] {
-        const { assert!(WIDTH.is_multiple_of(S::F32_LANES)) };
-        S::as_simd_f32s(x).0
-    }
+            #[inline(always)]
+            fn parts<S: Simd>(x: &Wide<Self>) -> &[S::$vector] {
+                const { assert!(WIDTH.is_multiple_of(S::$lanes)) };
+                S::$as_simd(x).0
+            }
 
-    #[inline(always)]
-    fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [S::f32s] {
-        S::as_mut_simd_f32s(x).0
-    }
+            #[inline(always)]
+            fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [S::$vector] {
+                S::$as_mut_simd(x).0
+            }
+        }
+    };
 }
 
-impl Number for f64 {
-    type Vector<S: Simd> = S::f64s;
-
-    #[inline(always)]
-    fn fused(self, a: Self, b: Self) -> Self {
-        self.mul_add(a, b)
-    }
-
-    #[inline(always)]
-    fn all<S: Simd>(self, simd: S) -> S::f64s {
-        simd.splat_f64s(self)
-    }
-
-    #[inline(always)]
-    fn add_product<S: Simd>(simd: S, x: S::f64s, y: S::f64s, z: S::f64s) -> S::f64s {
-        simd.mul_add_f64s(x, y, z)
-    }
-
-    #[inline(always)]
-    fn parts<S: Simd>(x: &Wide<Self>) -> &[S::f64s] {
-        const { assert!(WIDTH.is_multiple_of(S::F64_LANES)) };
-        S::as_simd_f64s(x).0
-    }
-
-    #[inline(always)]
-    fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [S::f64s] {
-        S::as_mut_simd_f64s(x).0
-    }
-}
+number!(f32, f32s, F32_LANES, splat_f32s, mul_add_f32s, as_simd_f32s, as_mut_simd_f32s);
+number!(f64, f64s, F64_LANES, splat_f64s, mul_add_f64s, as_simd_f64s, as_mut_simd_f64s);
 
 /// `x = (L L')^-1 x` in the order of elimination; `panel` is scratch.
 pub(super) fn solve<T: Number>(

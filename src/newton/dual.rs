@@ -98,8 +98,6 @@ pub struct DualFace<'s, 'a> {
     pub constraints: &'s Constraints,
     /// `e`, whole on every rank.
     pub balance: &'s [f64],
-    /// Inner products.
-    pub space: &'s RowSpace<'s>,
     /// The rows of the set.
     pub rows: CoarseFace,
 }
@@ -118,12 +116,12 @@ impl DualFace<'_, '_> {
         let size = self.balance.iter().map(|e| e * e).sum::<f64>().sqrt();
         while let Some(motion) = self.rows.unbalanced(self.balance, size) {
             let moved = self.coarse().moved(&motion);
-            let most = self.space.maximum(moved.iter().fold(0.0, |most, m| most.max(m.abs())));
+            let most = self.dual.space.maximum(moved.iter().fold(0.0, |most, m| most.max(m.abs())));
             let mut joined = 0.0;
             for (kept, _) in kept.iter_mut().zip(&moved).filter(|(kept, m)| !**kept && **m > RESISTS * most) {
                 (*kept, joined) = (true, 1.0);
             }
-            if self.space.maximum(joined) == 0.0 {
+            if self.dual.space.maximum(joined) == 0.0 {
                 return false;
             }
             match CoarseFace::new(self.coarse(), kept.to_vec()) {
@@ -188,7 +186,7 @@ impl Face for DualFace<'_, '_> {
 
     fn gaps(&mut self, residual: &mut [f64]) {
         self.dual.timer.time("coarse problem", || {
-            let a = motion::amplitudes(&self.rows, self.coarse(), self.space, residual);
+            let a = motion::amplitudes(&self.rows, self.coarse(), self.dual.space, residual);
             self.coarse().add_transpose(-1.0, &a, residual);
         });
     }

@@ -8,6 +8,7 @@
 //!
 //! Gaps play no part: a body may first have to move to where a contact holds it.
 
+use super::problem::dot;
 use crate::constraint::Constraints;
 use crate::feti::bodies::{Motion, complement};
 use crate::feti::coarse::{Coarse, MODES};
@@ -30,8 +31,8 @@ pub struct Unheld {
 /// Forces smaller than this share of all are nothing.
 const NOTHING: f64 = 1e-9;
 
-/// Whether all bodies are held at the end of each stage, where loads have the resultants `R'f` (six numbers a subdomain).
-/// Collective.
+/// Whether all bodies are held at the end of each stage, where loads have the resultants `R'f` (six numbers a subdomain,
+/// collective), which are asked for only if supports leave some body free. Collective.
 ///
 /// # Errors
 /// The first motion that is not held: on every rank.
@@ -39,7 +40,8 @@ pub fn check(
     coarse: &Coarse,
     space: &RowSpace,
     constraints: &Constraints,
-    resultants: &[Vec<f64>],
+    stages: usize,
+    resultants: impl Fn(usize) -> Vec<f64>,
 ) -> Result<(), Box<Unheld>> {
     let is_contact = |row: usize| constraints.rows[row].is_inequality();
     let motions = coarse.motions();
@@ -58,7 +60,7 @@ pub fn check(
         let (body, motion) = motions.describe(&whole);
         Err(Box::new(Unheld { body, motion, stage, driven }))
     };
-    for (stage, resultants) in resultants.iter().enumerate() {
+    for (stage, resultants) in (0..stages).map(|stage| (stage, resultants(stage))) {
         let (mut force, mut all) = (vec![0.0; MODES * motions.bodies()], 0.0);
         for (subdomain, modes) in resultants.chunks_exact(MODES).enumerate() {
             let mut of_subdomain = vec![0.0; force.len()];
@@ -91,10 +93,6 @@ pub fn check(
         }
     }
     Ok(())
-}
-
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
 fn size(x: &[f64]) -> f64 {

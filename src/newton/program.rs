@@ -193,13 +193,8 @@ impl Programs {
         let bounded: Vec<bool> = problem.constraints.rows.iter().map(|row| row.is_inequality()).collect();
         let rows = self.take_face(&dual.projector.coarse, bounded.len())?;
         let mut kept = rows.kept().to_vec();
-        let mut face = DualFace {
-            dual: dual.reborrow(),
-            constraints: problem.constraints,
-            balance: &warm.balance,
-            space: problem.space,
-            rows,
-        };
+        let mut face =
+            DualFace { dual: dual.reborrow(), constraints: problem.constraints, balance: &warm.balance, rows };
         if !face.complete(&mut kept) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
             return Ok(Found { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
