@@ -78,7 +78,7 @@ fn subdomain(cells: usize) {
     let pattern = &symbolic[0].pattern;
     let mut values = vec![0.0; pattern.rows.len()];
     let rest = vec![0.0; pattern.dofs()];
-    let assembly = best(10, || {
+    let assembly = best(200, || {
         stiffness::assemble(&subdomains[0], &materials[0], &[], &rest, pattern, &mut values);
     });
     for precision in [Precision::Single, Precision::Double] {

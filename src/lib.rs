@@ -22,6 +22,7 @@ pub mod newton;
 pub mod qp;
 pub mod results;
 pub mod scene;
+pub mod simd;
 pub mod study;
 pub mod tensor;
 

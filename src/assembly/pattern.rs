@@ -56,19 +56,24 @@ impl Pattern {
     pub fn block_offset(&self, row: u32, column: u32) -> usize {
         let begin = self.column_begin[3 * column as usize] as usize;
         let end = self.column_begin[3 * column as usize + 1] as usize;
-        self.rows[begin..end].binary_search(&(3 * row)).expect("the pair of nodes is in the pattern")
+        let mut blocks = self.rows[begin..end].chunks_exact(3);
+        3 * blocks.position(|block| block[0] == 3 * row).expect("the pair of nodes is in the pattern")
     }
 
     /// Adds a 3x3 block `[i][j]` of nodes `(row, column)` to the lower triangle's values; of a diagonal block the lower
     /// part counts.
+    #[inline]
     pub fn add_block(&self, values: &mut [f64], row: u32, column: u32, block: &[[f64; 3]; 3]) {
-        for j in 0..3 {
-            let begin = self.column_begin[3 * column as usize + j] as usize;
-            if row == column {
-                (j..3).for_each(|i| values[begin + i - j] += block[i][j]);
-            } else {
-                let at = begin + self.block_offset(row, column) - j;
-                (0..3).for_each(|i| values[at + i] += block[i][j]);
+        let columns = &self.column_begin[3 * column as usize..3 * column as usize + 3];
+        if row == column {
+            for (j, &begin) in columns.iter().enumerate() {
+                (j..3).for_each(|i| values[begin as usize + i - j] += block[i][j]);
+            }
+        } else {
+            let offset = self.block_offset(row, column);
+            for (j, &begin) in columns.iter().enumerate() {
+                let at = begin as usize + offset - j;
+                values[at..at + 3].iter_mut().zip(block).for_each(|(value, row)| *value += row[j]);
             }
         }
     }

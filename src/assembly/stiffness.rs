@@ -3,7 +3,7 @@
 use super::pattern::Pattern;
 use super::{committed, displacements, integrated};
 use crate::decomposition::Subdomain;
-use crate::element::point::mirror;
+use crate::element::point::block;
 use crate::element::{Nodal, Point, by_kind};
 use crate::material::{History, Material};
 
@@ -34,7 +34,7 @@ fn assemble_of<const N: usize, const P: usize>(
     let mut plastic = 0;
     for (index, (nodes, points)) in integrated(points, &subdomain.elements, &subdomain.shape).enumerate() {
         let u = displacements(u, nodes);
-        let mut k = [[[[0.0; 3]; N]; 3]; N];
+        let mut k = [[[[0.0; N]; 3]; 3]; N];
         let mut yields = false;
         for (at, point) in points.iter().enumerate() {
             let committed = committed(history, P * index + at);
@@ -46,11 +46,10 @@ fn assemble_of<const N: usize, const P: usize>(
                 point.add_stiffness(&elastic, &mut k);
             }
         }
-        mirror(&mut k);
         plastic += usize::from(yields);
-        for (rows, &row) in k.iter().zip(nodes) {
+        for (a, &row) in nodes.iter().enumerate() {
             for (b, &column) in nodes.iter().enumerate().filter(|&(_, &column)| column <= row) {
-                pattern.add_block(values, row, column, &rows.map(|row| row[b]));
+                pattern.add_block(values, row, column, &block(&k, a, b));
             }
         }
     }

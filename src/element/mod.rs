@@ -9,7 +9,7 @@ pub mod tet10;
 pub mod tet4;
 
 pub use kind::Kind;
-pub use point::{Nodal, Point, Stiffness};
+pub use point::{Nodal, Point};
 
 /// An element of smaller shape has no volume, or a negative one: it is lost in the rounding of coordinates.
 pub const DEGENERATE: f64 = 1e-13;

@@ -5,13 +5,14 @@
 //! third of (m_a - g_a) . u_a is added to each normal strain: the trace is that of the means. Nodal vectors have three
 //! components a node.
 
+use crate::simd::vectorised;
 use crate::tensor::{COMPONENT, Tangent, Voigt, trace};
 
 /// A vector at each node.
 pub type Nodal<const N: usize> = [[f64; 3]; N];
 
-/// A matrix on nodal vectors: `[a][i][b][j]` is row (node a, component i), column (node b, component j).
-pub type Stiffness<const N: usize> = [[Nodal<N>; 3]; N];
+/// A matrix on nodal vectors: `[a][i][j][b]` is row (node a, component i), column (node b, component j).
+pub type Stiffness<const N: usize> = [[[[f64; N]; 3]; 3]; N];
 
 /// An integration point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,53 +62,65 @@ impl<const N: usize> Point<N> {
         }
     }
 
-    /// Adds the stiffness w B' D B for a symmetric tangent D. Only what [`mirror`] keeps is of use.
+    /// Adds the stiffness w B' D B for a symmetric tangent D, to be read by [`block`].
     #[inline]
     pub fn add_stiffness(&self, tangent: &Tangent, k: &mut Stiffness<N>) {
+        vectorised(
+            k,
+            #[inline(always)]
+            |k| self.add_products(tangent, k),
+        );
+    }
+
+    #[inline(always)]
+    fn add_products(&self, tangent: &Tangent, k: &mut Stiffness<N>) {
+        // Nodes come last: sums run over all of them at once.
+        let gradients = by_direction(&self.gradients);
+        let dilatation = self.dilatation.as_ref().map(by_direction);
+        let weighted = gradients.map(|g| g.map(|g| self.weight * g));
         // Six rows of w D B; then every row of B' is three scaled rows of it.
-        let mut stresses = [[[0.0; 3]; N]; 6];
+        let mut stresses = [[[0.0; N]; 3]; 6];
         for (row, d) in stresses.iter_mut().zip(tangent) {
-            for (column, g) in row.iter_mut().zip(&self.gradients) {
-                let [x, y, z] = g.map(|g| self.weight * g);
-                column[0] = d[0] * x + d[3] * y + d[5] * z;
-                column[1] = d[3] * x + d[1] * y + d[4] * z;
-                column[2] = d[5] * x + d[4] * y + d[2] * z;
+            for (entries, column) in row.iter_mut().zip(COMPONENT) {
+                *entries = combined(column.map(|c| d[c]), weighted.each_ref());
             }
-            if let Some(dilatation) = &self.dilatation {
+            if let Some(dilatation) = &dilatation {
                 let mean = self.weight * (d[0] + d[1] + d[2]) / 3.0;
-                for (entry, d) in row.as_flattened_mut().iter_mut().zip(dilatation.as_flattened()) {
-                    *entry += mean * d;
+                for (entries, d) in row.iter_mut().zip(dilatation) {
+                    (0..N).for_each(|b| entries[b] += mean * d[b]);
                 }
             }
         }
-        for (block, [x, y, z]) in k.iter_mut().zip(&self.gradients) {
-            for (entries, row) in block.iter_mut().zip(COMPONENT) {
-                let [p, q, r] = row.map(|c| stresses[c].as_flattened());
-                for (j, entry) in entries.as_flattened_mut().iter_mut().enumerate() {
-                    *entry += x * p[j] + y * q[j] + z * r[j];
-                }
-            }
-        }
-        if let Some(dilatation) = &self.dilatation {
-            let [p, q, r] = [0, 1, 2].map(|c| stresses[c].as_flattened());
-            let rows = k.as_flattened_mut().iter_mut().zip(dilatation.as_flattened());
-            for (entries, d) in rows.map(|(entries, d)| (entries.as_flattened_mut(), d / 3.0)) {
-                for (j, entry) in entries.iter_mut().enumerate() {
-                    *entry += d * (p[j] + q[j] + r[j]);
+        for (a, block) in k.iter_mut().enumerate() {
+            for (i, (rows, row)) in block.iter_mut().zip(COMPONENT).enumerate() {
+                for (j, entries) in rows.iter_mut().enumerate() {
+                    let sum = combined(self.gradients[a], row.each_ref().map(|&c| &stresses[c][j]));
+                    (0..N).for_each(|b| entries[b] += sum[b]);
+                    if let Some(dilatation) = &dilatation {
+                        let sum = combined([1.0; 3], [0, 1, 2].map(|c| &stresses[c][j]));
+                        (0..N).for_each(|b| entries[b] += dilatation[i][a] / 3.0 * sum[b]);
+                    }
                 }
             }
         }
     }
 }
 
-/// Copies the upper triangle to the lower one: the matrix is symmetric to the last bit.
+/// Components of vectors at the nodes, direction by direction.
+#[inline(always)]
+fn by_direction<const N: usize>(vectors: &Nodal<N>) -> [[f64; N]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|a| vectors[a][i]))
+}
+
+/// `x p + y q + z r`.
+#[inline(always)]
+fn combined<const N: usize>([x, y, z]: [f64; 3], [p, q, r]: [&[f64; N]; 3]) -> [f64; N] {
+    std::array::from_fn(|b| x * p[b] + y * q[b] + z * r[b])
+}
+
+/// The block `[i][j]` of nodes `(a, b)`: the matrix is symmetric to the last bit.
 #[inline]
-pub fn mirror<const N: usize>(k: &mut Stiffness<N>) {
-    let rows = k.as_flattened_mut();
-    for i in 1..rows.len() {
-        let (above, below) = rows.split_at_mut(i);
-        for (entry, row) in below[0].as_flattened_mut().iter_mut().zip(above) {
-            *entry = row.as_flattened()[i];
-        }
-    }
+pub fn block<const N: usize>(k: &Stiffness<N>, a: usize, b: usize) -> [[f64; 3]; 3] {
+    let entry = |i: usize, j: usize| if a < b { k[a][i][j][b] } else { k[b][j][i][a] };
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
 }

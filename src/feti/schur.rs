@@ -6,12 +6,11 @@
 
 use std::rc::Rc;
 
-use pulp::Arch;
-
 use super::Torn;
 use super::cholesky::{Analysis, Factor, Lower, Precision, WIDTH, Workspace};
 use super::factor::{NotDefinite, Symbolic};
 use super::stock::{Batch, Stock};
+use crate::simd::vectorised;
 
 /// Entries of one block of the stiffness matrix, line by line.
 #[derive(Default)]
@@ -288,7 +287,11 @@ impl<'a, const W: usize> Job<'a, W> {
     fn respond(&self, workspace: &mut Workspace, t: &[[f64; W]]) -> Vec<[f64; W]> {
         let (Some(interior), Some(factor)) = (&self.split.interior, &self.values.interior) else { return Vec::new() };
         let mut inside = vec![[0.0; W]; interior.unknowns.len()];
-        Arch::new().dispatch(|| scatter(&self.split.coupling, &self.values.coupling, t, &mut inside));
+        vectorised(
+            &mut inside,
+            #[inline(always)]
+            |inside| scatter(&self.split.coupling, &self.values.coupling, t, inside),
+        );
         let solve = if W == WIDTH { Workspace::solve_wide } else { Workspace::solve };
         solve(workspace, &interior.cholesky, factor, inside.as_flattened_mut());
         inside
@@ -298,12 +301,16 @@ impl<'a, const W: usize> Job<'a, W> {
     fn forces(&self, t: &[[f64; W]], inside: &[[f64; W]]) -> Vec<[f64; W]> {
         let Split { boundary_block, coupling, .. } = self.split;
         let mut forces = vec![[0.0; W]; t.len()];
-        Arch::new().dispatch(|| {
-            multiply_symmetric(boundary_block, &self.values.boundary_block, t, &mut forces);
-            if !inside.is_empty() {
-                gather(coupling, &self.values.coupling, inside, &mut forces);
-            }
-        });
+        vectorised(
+            &mut forces,
+            #[inline(always)]
+            |forces| {
+                multiply_symmetric(boundary_block, &self.values.boundary_block, t, forces);
+                if !inside.is_empty() {
+                    gather(coupling, &self.values.coupling, inside, forces);
+                }
+            },
+        );
         forces
     }
 }
