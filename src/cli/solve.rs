@@ -40,6 +40,9 @@ pub struct Solve {
     progress: Mode,
 }
 
+/// Tolerance of coarser levels: well below what halving the cells changes.
+const ENOUGH_TO_START: f64 = 5e-2;
+
 /// When coarser levels are solved first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Cascade {
@@ -100,7 +103,10 @@ pub fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     for level in cascade.before(source.level, &scene) {
         let watch = timer.total_seconds();
         // A level that is too coarse for the scene is left out.
-        let Ok(scene) = found.at_level(level, &sets) else { continue };
+        let Ok(mut scene) = found.at_level(level, &sets) else { continue };
+        for tolerance in [&mut scene.solver.newton_tolerance, &mut scene.solver.residual_tolerance] {
+            *tolerance = tolerance.max(ENOUGH_TO_START);
+        }
         let solved = solve_level(&source, level, &scene, coarser.take(), comm, &timer, &mut monitor);
         let Ok((discrete, solved)) = solved else { continue };
         let Summary { newton_iterations, counters, sizes, converged, .. } = &solved.summary;
