@@ -2,7 +2,7 @@
 //!
 //! Slave nodes beyond the edge of the master surface carry no contact.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use super::ContactPair;
 use super::surface::{GatheredSurface, difference, dot};
@@ -45,68 +45,35 @@ fn differ(one: &GatheredSurface, other: &GatheredSurface, opposite: &[Option<(us
 /// For each node of one surface the node of the other that is opposite, and its distance. `None` if only the surface is.
 fn opposite_nodes(one: &GatheredSurface, other: &GatheredSurface) -> Option<Vec<Option<(usize, f64)>>> {
     let spacing = other.spacing();
-    let grid = Grid::new(&other.points, spacing);
     let tree = BallTree::new(&other.corners().collect::<Vec<_>>());
     let nodes = one.points.iter().zip(one.normals_and_areas());
     nodes
-        .map(|(&point, (normal, _))| match grid.opposite(point, normal) {
-            None if hits(other, &tree.along(point, normal, spacing), point, normal, spacing) => None,
-            found => Some(found),
+        .map(|(&point, (normal, _))| {
+            let triangles = tree.along(point, normal, spacing);
+            match opposite(other, &triangles, point, normal, spacing) {
+                None if hits(other, &triangles, point, normal, spacing) => None,
+                found => Some(found),
+            }
         })
         .collect()
 }
 
-/// Points sorted into cubes of one edge length.
-struct Grid<'a> {
-    points: &'a [[f64; 3]],
+/// The nearest corner of these triangles of a surface on the line through `point` along `normal`, and its signed distance.
+fn opposite(
+    surface: &GatheredSurface,
+    triangles: &[usize],
+    point: [f64; 3],
+    normal: [f64; 3],
     spacing: f64,
-    cubes: HashMap<[i64; 3], Vec<usize>>,
-    low: [f64; 3],
-    high: [f64; 3],
-}
-
-impl<'a> Grid<'a> {
-    fn new(points: &'a [[f64; 3]], spacing: f64) -> Self {
-        let mut cubes: HashMap<_, Vec<usize>> = HashMap::new();
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for (index, point) in points.iter().enumerate() {
-            cubes.entry(point.map(|x| (x / spacing).floor() as i64)).or_default().push(index);
-            for a in 0..3 {
-                low[a] = low[a].min(point[a]);
-                high[a] = high[a].max(point[a]);
-            }
-        }
-        Self { points, spacing, cubes, low, high }
-    }
-
-    /// The nearest point on the line through `point` along `normal`, and its signed distance.
-    fn opposite(&self, point: [f64; 3], normal: [f64; 3]) -> Option<(usize, f64)> {
-        let middle: [f64; 3] = std::array::from_fn(|a| 0.5 * (self.low[a] + self.high[a]));
-        let half: [f64; 3] = std::array::from_fn(|a| 0.5 * (self.high[a] - self.low[a]));
-        let reach = dot(difference(middle, point), difference(middle, point)).sqrt() + dot(half, half).sqrt();
-        let steps = (reach / self.spacing).ceil() as i64 + 1;
-        (0..=steps).flat_map(|k| [k, -k]).find_map(|k| {
-            let at: [f64; 3] = std::array::from_fn(|a| point[a] + k as f64 * self.spacing * normal[a]);
-            let outside =
-                |a: usize| at[a] < self.low[a] - 2.0 * self.spacing || at[a] > self.high[a] + 2.0 * self.spacing;
-            if (0..3).any(outside) { None } else { self.nearby(point, normal, at) }
-        })
-    }
-
-    /// The best point on the line among those in the cubes around `at`.
-    fn nearby(&self, point: [f64; 3], normal: [f64; 3], at: [f64; 3]) -> Option<(usize, f64)> {
-        let cube = at.map(|x| (x / self.spacing).floor() as i64);
-        (0..27)
-            .filter_map(|n| self.cubes.get(&[cube[0] + n % 3 - 1, cube[1] + n / 3 % 3 - 1, cube[2] + n / 9 - 1]))
-            .flatten()
-            .filter_map(|&index| {
-                let arm = difference(self.points[index], point);
-                let gap = dot(arm, normal);
-                let beside: [f64; 3] = std::array::from_fn(|a| arm[a] - gap * normal[a]);
-                (dot(beside, beside).sqrt() <= TOLERANCE * self.spacing).then_some((index, gap))
-            })
-            .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()).then(a.0.cmp(&b.0)))
-    }
+) -> Option<(usize, f64)> {
+    let corners = triangles.iter().flat_map(|&triangle| surface.triangles[triangle]);
+    let found = corners.filter_map(|index| {
+        let arm = difference(surface.points[index], point);
+        let gap = dot(arm, normal);
+        let beside: [f64; 3] = std::array::from_fn(|a| arm[a] - gap * normal[a]);
+        (dot(beside, beside).sqrt() <= TOLERANCE * spacing).then_some((index, gap))
+    });
+    found.min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()).then(a.0.cmp(&b.0)))
 }
 
 /// Whether the line through `point` along `normal` meets one of these triangles of a surface: inside or, to a thousandth

@@ -19,7 +19,7 @@ const NODES: usize = 36;
 /// Triangles on all faces, and tetrahedra.
 const ELEMENTS: usize = 64 + 48;
 
-const SCENE: &str = r#"
+pub const SCENE: &str = r#"
 [material.steel]
 young = 210000.0
 poisson = 0.3
@@ -48,7 +48,7 @@ slave = "above.zmin"
 master = "below.zmax"
 "#;
 
-fn bytes(form: Form) -> Vec<u8> {
+pub fn bytes(form: Form) -> Vec<u8> {
     write(&[("lower", LOWER), ("upper", UPPER)], form)
 }
 

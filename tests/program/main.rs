@@ -7,6 +7,7 @@ mod benchmark;
 mod cascade;
 mod common;
 mod elements;
+mod fuzz;
 mod gmsh;
 mod hard;
 mod held;
