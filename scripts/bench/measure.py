@@ -5,39 +5,72 @@ import json
 import os
 import pathlib
 import platform
+import shlex
 import subprocess
 import sys
 import tempfile
 import time
+import typing
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RAW = ROOT / "bench-results" / "raw"
 
 
-def run(runs, repeat, quiet):
-    """All runs (level, Variant, ranks), the whole list `repeat` times, so that a slow spell does not hit one kind only. `quiet`
-    says that nothing else runs on the machine."""
+def add_arguments(parser):
+    """Which program is measured and how it is started: on a cluster inside a job, where nothing can be built."""
+    parser.add_argument("--repeat", type=int, default=1, help="runs of each kind")
+    parser.add_argument("--busy", action="store_true", help="other work runs beside: counts are kept, times are not shown")
+    parser.add_argument("--program", type=pathlib.Path, help="built before; without it the one of this repository is built")
+    parser.add_argument("--launch", default="mpirun", help="what starts the ranks, options included; understands -n NUMBER")
+
+
+class Run(typing.NamedTuple):
+    """What is run. `label` says in the records what kind of run it is."""
+
+    label: dict
+    options: list
+    """Of `fetiplast solve`, the scene first."""
+    ranks: int
+
+
+class Program:
+    """The program that is measured, and how it is started."""
+
+    def __init__(self, arguments):
+        self.launch = shlex.split(arguments.launch)
+        self.path, self.environment = arguments.program, dict(os.environ)
+        # Other nodes see the folder of the results, if anything.
+        self.shared = self.path is not None
+        if self.path is None:
+            subprocess.run(["scripts/setup"], cwd=ROOT, check=True)
+            entries = in_environment("env", "-0").split("\0")
+            self.environment = dict(entry.split("=", 1) for entry in entries if "=" in entry)
+            subprocess.run(["cargo", "build", "--release", "--quiet"], cwd=ROOT, env=self.environment, check=True)
+            self.path = pathlib.Path(self.environment.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "fetiplast"
+
+
+def run(runs, arguments, folder, prefix=""):
+    """All runs, the whole list as often as is asked for, so that a slow spell does not hit one kind only. Their records go to
+    a new file in the folder, which is returned with the number of runs that failed."""
     if not runs:
-        sys.exit("scripts/tables: nothing to measure with these --levels and --variants")
-    subprocess.run(["scripts/setup"], cwd=ROOT, check=True)
-    environment = in_environment("env", "-0")
-    environment = dict(entry.split("=", 1) for entry in environment.split("\0") if "=" in entry)
-    subprocess.run(["cargo", "build", "--release", "--quiet"], cwd=ROOT, env=environment, check=True)
-    machine = circumstances(environment)
-    RAW.mkdir(parents=True, exist_ok=True)
-    file = RAW / f"{now():%Y%m%dT%H%M%SZ}-{machine['commit'][:12]}.jsonl"
+        sys.exit("scripts: nothing to measure with these options")
+    program = Program(arguments)
+    machine = circumstances(program.environment)
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"{prefix}{now():%Y%m%dT%H%M%SZ}-{machine['commit'][:12]}.jsonl"
     failed = 0
-    for repetition in range(1, repeat + 1):
-        for level, variant, ranks in runs:
-            record = solve(level, variant, ranks, environment)
+    for repetition in range(1, arguments.repeat + 1):
+        for run in runs:
+            record = {**run.label, **solve(program, run, folder)}
             record["repetition"] = repetition
-            record["provenance"].update(machine, quiet=quiet)
+            record["provenance"].update(machine, quiet=not arguments.busy)
+            if arguments.program:
+                record["provenance"].update(origin(record["summary"] or {}))
             with open(file, "a") as lines:
                 lines.write(json.dumps(record) + "\n")
             failed += record["exit_code"] != 0
-            print(told(record), flush=True)
-    print(f"Written to {file.relative_to(ROOT)}; scripts/tables write makes the tables.")
-    return 1 if failed else 0
+            print(told(run.label, record), flush=True)
+    return file, failed
 
 
 def in_environment(*command):
@@ -50,40 +83,42 @@ def now():
     return datetime.datetime.now(datetime.timezone.utc)
 
 
-def solve(level, variant, ranks, environment):
-    """One run of the benchmark with the paper's tolerances, which are the scene's own."""
-    options = ["--level", str(level), *variant.options, "--progress", "off"]
-    target = pathlib.Path(environment.get("CARGO_TARGET_DIR", ROOT / "target"))
+def solve(program, run, folder):
+    """One run, without its label."""
+    options = [*run.options, "--progress", "off"]
     started, load = now(), os.getloadavg()[0]
-    with tempfile.TemporaryDirectory() as out:
+    with tempfile.TemporaryDirectory(dir=folder if program.shared else None) as out:
         summary = pathlib.Path(out) / "summary.json"
-        command = ["mpirun", "-np", str(ranks), str(target / "release" / "fetiplast"), "solve", "two-blocks", *options]
-        command += ["--out", out, "--summary", str(summary)]
+        start = [*program.launch, "-n", str(run.ranks)]
+        command = [*start, str(program.path), "solve", *options, "--out", out, "--summary", str(summary)]
         watch = time.monotonic()
-        done = subprocess.run(command, env=environment, capture_output=True, text=True)
+        done = subprocess.run(command, env=program.environment, capture_output=True, text=True)
         seconds = time.monotonic() - watch
         found = json.loads(summary.read_text()) if summary.exists() else None
     if done.returncode:
         print(done.stdout + done.stderr, file=sys.stderr)
     return {
-        "level": level,
-        "variant": variant.name,
-        "ranks": ranks,
         "exit_code": done.returncode,
         "seconds": seconds,
         "summary": found,
         "provenance": {
-            "command": " ".join(["mpirun", "-np", str(ranks), "fetiplast", "solve", "two-blocks", *options]),
+            "command": shlex.join([*start, "fetiplast", "solve", *options]),
             "date": f"{started:%Y-%m-%dT%H:%M:%SZ}",
             "load_average": load,
         },
     }
 
 
-def told(record):
+def origin(summary):
+    """The commit of a program that was built elsewhere, as it says itself."""
+    commit = summary.get("provenance", {}).get("commit", "unknown")
+    return {"commit": commit.removesuffix("-dirty"), "dirty": commit.endswith("-dirty")}
+
+
+def told(label, record):
     summary = record["summary"] or {}
     return (
-        f"level {record['level']}, {record['variant']}, {record['ranks']} ranks: exit code {record['exit_code']}, "
+        f"{', '.join(f'{key} {value}' for key, value in label.items())}: exit code {record['exit_code']}, "
         f"{summary.get('newton_iterations')} Newton steps, {summary.get('hessian_multiplications')} applications of F, "
         f"{record['seconds']:.1f} s, {summary.get('peak_rss_mb') or 0:.0f} MiB"
     )

@@ -111,10 +111,10 @@ def measured(value):
     return f"{value:.3g}" if value < 999.5 else thousands(round(value))
 
 
-def read(variants):
+def read(variants, files):
     """Groups by (level, variant, ranks); runs that failed, and variants that are measured no more, are left out."""
     kinds = {}
-    for file in sorted((RESULTS / "raw").glob("*.jsonl")):
+    for file in files:
         for line in file.read_text().splitlines():
             record = json.loads(line)
             if record["exit_code"] == 0 and record["summary"] and record["variant"] in variants:
@@ -376,7 +376,8 @@ def table_1(groups, study, paper):
     return table(head, rows) + "\n" + " ".join(equal) + "\n"
 
 
-DEPENDS_ON_RANKS = {"ranks", "warnings", "time", "work", "communication", "time_total", "peak_rss_mb", "memory_estimate_mb", "newton", "cascade"}
+DEPENDS_ON_RANKS = {"ranks", "warnings", "time", "work", "communication", "time_total", "peak_rss_mb", "memory_estimate_mb"}
+DEPENDS_ON_RANKS |= {"newton", "cascade", "provenance"}
 
 
 def equality(variant, level, summaries):
@@ -415,7 +416,7 @@ def contents(variants, study, ranks):
     """Every file this writes, with its text."""
     paper = json.loads((RESULTS / "paper.json").read_text())
     references = json.loads((RESULTS / "reference.json").read_text())["levels"]
-    groups = read(variants)
+    groups = read(variants, sorted((RESULTS / "raw").glob("*.jsonl")))
     levels = {}
     for level, variant, on in sorted(groups, key=lambda kind: (kind[0], variants.index(kind[1]))):
         if on == ranks:
@@ -452,6 +453,26 @@ def contents(variants, study, ranks):
         RESULTS / "kernels.md": kernels.write(RESULTS / "kernels.jsonl"),
         ROOT / "README.md": f"{before}{BEGIN}\n{short}{END}{after}",
     }
+
+
+def table_of(number, file, variants, levels, ranks):
+    """Table 1 or 2 beside the paper's, from the runs of one file."""
+    groups = read(variants, [file])
+    if not groups:
+        sys.exit(f"scripts/tables: no run of {file} succeeded")
+    paper = json.loads((RESULTS / "paper.json").read_text())
+    if number == 1:
+        study = [(variant, level, ranks) for variant in variants for level in levels]
+        tables = [table_1(groups, study, paper["table1"])]
+    else:
+        references = json.loads((RESULTS / "reference.json").read_text())["levels"]
+        tables = []
+        for level in levels:
+            of_level = {v: groups[level, v, ranks[-1]] for v in variants if (level, v, ranks[-1]) in groups}
+            if of_level:
+                tables += [f"## Level {level}\n", cost_table(of_level, paper["table2"].get(str(level), {}))]
+                tables += [result_table(of_level, references.get(str(level), {}))]
+    return "\n".join([f"# Table {number}\n", *tables, "## Where the runs come from\n", circumstances(groups.values())])
 
 
 def write(variants, study, ranks, only_check):
