@@ -1,8 +1,10 @@
-"""A line chart as SVG, written directly so that equal numbers give equal files."""
+"""Charts as SVG, written directly so that equal numbers give equal files."""
+
+import math
 
 WIDTH, HEIGHT = 760, 400
 LEFT, RIGHT, TOP, BOTTOM = 70, 210, 44, 56
-COLOURS = ["#555555", "#0072b2", "#d55e00", "#009e73", "#cc79a7"]
+COLOURS = ["#555555", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999933"]
 
 
 def chart(title, x_label, y_label, x_values, series):
@@ -14,14 +16,7 @@ def chart(title, x_label, y_label, x_values, series):
         share = x_values.index(x) / max(len(x_values) - 1, 1)
         return LEFT + share * width, TOP + height * (1 - y / top)
 
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
-        'font-family="sans-serif" font-size="13" fill="#222">',
-        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
-        text(LEFT, 24, title, "start", 'font-size="15"'),
-        text(LEFT + width / 2, HEIGHT - 12, x_label),
-        text(0, 0, y_label, "middle", f'transform="translate(16 {TOP + height / 2:.1f}) rotate(-90)"'),
-    ]
+    parts = frame(title, x_label, y_label)
     for step in range(6):
         value = top * step / 5
         _, y = at(x_values[0], value)
@@ -39,6 +34,106 @@ def chart(title, x_label, y_label, x_values, series):
     for label, below in zip(spread(labels), labels):
         parts.append(text(below[1], label, below[2], "start", f'style="fill:{below[3]}"'))
     return "\n".join([*parts, "</svg>", ""])
+
+
+def frame(title, x_label, y_label):
+    """The paper and what is written around the axes."""
+    width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
+    return [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
+        'font-family="sans-serif" font-size="13" fill="#222">',
+        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
+        text(LEFT, 24, title, "start", 'font-size="15"'),
+        text(LEFT + width / 2, HEIGHT - 12, x_label),
+        text(0, 0, y_label, "middle", f'transform="translate(16 {TOP + height / 2:.1f}) rotate(-90)"'),
+    ]
+
+
+def curves(title, x_label, y_label, series, y_top=None):
+    """`series`: (name, {x: y}, dashed). Both axes are logarithmic; with `y_top` the vertical one goes in a straight line from
+    zero to there."""
+    xs = sorted({x for _, points, _ in series for x in points})
+    ys = [y for _, points, _ in series for y in points.values()]
+    width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
+    x_ticks = xs if len(xs) <= 8 else decades(xs[0], xs[-1])
+    y_ticks = [y_top * step / 5 for step in range(6)] if y_top else ticks(min(ys), max(ys))
+    low, high = (0.0, y_top) if y_top else (math.log(min(y_ticks[0], *ys)), math.log(max(y_ticks[-1], *ys)))
+    left, right = math.log(xs[0]), math.log(xs[-1])
+
+    def at(x, y):
+        along = (math.log(x) - left) / (right - left or 1)
+        up = ((y if y_top else math.log(y)) - low) / (high - low or 1)
+        return LEFT + along * width, TOP + height * (1 - up)
+
+    parts = frame(title, x_label, y_label)
+    for value in y_ticks:
+        _, y = at(xs[0], value)
+        parts.append(f'<line x1="{LEFT}" x2="{LEFT + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
+        parts.append(text(LEFT - 8, y + 4, number(value), "end"))
+    for x in x_ticks:
+        parts.append(text(at(x, y_ticks[-1])[0], TOP + height + 20, number(x)))
+    labels = []
+    for (name, points, dashed), colour in zip(series, COLOURS):
+        places = [at(x, y) for x, y in sorted(points.items())]
+        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+        dash = ' stroke-dasharray="6 4"' if dashed else ""
+        parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>')
+        if not dashed:
+            parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{colour}"/>' for x, y in places]
+        labels.append([places[-1][1] + 4, places[-1][0] + 10, name, colour])
+    for label, below in zip(spread(labels), labels):
+        parts.append(text(below[1], label, below[2], "start", f'style="fill:{below[3]}"'))
+    return "\n".join([*parts, "</svg>", ""])
+
+
+def bars(title, x_label, y_label, columns):
+    """Stacked bars. `columns`: (name, {part: height}); all have the same parts, the first lies at the bottom."""
+    top = nice_top(1000 * max(sum(column.values()) for _, column in columns)) / 1000
+    width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
+    parts = frame(title, x_label, y_label)
+    for step in range(6):
+        y = TOP + height * (1 - step / 5)
+        parts.append(f'<line x1="{LEFT}" x2="{LEFT + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
+        parts.append(text(LEFT - 8, y + 4, number(top * step / 5), "end"))
+    share = width / len(columns)
+    for place, (name, column) in enumerate(columns):
+        x, done = LEFT + (place + 0.5) * share, 0.0
+        thick = min(0.7 * share, 60)
+        parts.append(text(x, TOP + height + 20, name))
+        for value, colour in zip(column.values(), COLOURS):
+            tall = height * value / top
+            y = TOP + height * (1 - done / top) - tall
+            parts.append(f'<rect x="{x - thick / 2:.1f}" y="{y:.1f}" width="{thick:.1f}" height="{tall:.1f}" fill="{colour}"/>')
+            done += value
+    for place, (name, colour) in enumerate(zip(columns[0][1], COLOURS)):
+        y = TOP + height - 20 * place
+        parts.append(f'<rect x="{LEFT + width + 12}" y="{y - 11:.1f}" width="12" height="12" fill="{colour}"/>')
+        parts.append(text(LEFT + width + 30, y, name, "start"))
+    return "\n".join([*parts, "</svg>", ""])
+
+
+def decades(least, most):
+    """The powers of ten from one at or below to one at or above."""
+    first, last = math.floor(math.log10(least)), math.ceil(math.log10(most))
+    return [x for x in (10.0**k for k in range(first, last + 1)) if least <= x <= most]
+
+
+def ticks(least, most):
+    """Round numbers around a range: powers of ten, where there are few with their double and fivefold."""
+    first, last = math.floor(math.log10(least)), math.ceil(math.log10(most))
+    steps = (1, 2, 5) if last - first <= 2 else (1,)
+    all_of_them = [s * 10.0**k for k in range(first, last + 1) for s in steps]
+    below = [x for x in all_of_them if x <= least]
+    above = [x for x in all_of_them if x >= most]
+    return [x for x in all_of_them if below[-1] <= x <= above[0]]
+
+
+def number(value):
+    """Short: thousands as k and millions as M."""
+    for size, letter in ((1e6, "M"), (1e3, "k")):
+        if value >= 10 * size or (value >= size and value % size == 0):
+            return f"{value / size:g}{letter}"
+    return f"{value:.3g}"
 
 
 def spread(labels, distance=17):

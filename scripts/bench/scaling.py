@@ -1,0 +1,216 @@
+"""Strong, weak and numerical scalability: tables and plots from the raw runs of scripts/study."""
+
+import json
+import sys
+import typing
+
+from . import plot
+from .markdown import table
+from .measure import ROOT
+from .report import Group, circumstances, thousands
+
+RESULTS = ROOT / "bench-results"
+
+HEAD = """\
+# Scalability
+
+Written by `scripts/study write` from the newest commit's runs in [raw/scaling](raw/scaling), which `scripts/study run` made.
+Seconds are of the whole solve without starting and ending the processes, medians of the repetitions with smallest and
+largest; so is memory. Speed-up and efficiency are those of the medians, against the smallest number of ranks. Runs start
+from rest, without a cascade. Counts do not depend on the number of ranks. `cells` are those along the edge of a subdomain.
+"""
+
+WHERE_BUSY = """
+**Other work ran beside some of these runs, or there were more ranks than cores: their times are left out of the tables, and
+the plots of times are missing.**
+"""
+
+
+class Kind(typing.NamedTuple):
+    """What a run is about, but for its number of ranks."""
+
+    scene: str
+    options: str
+    level: int
+    width: int
+    cells: int
+
+    def name(self):
+        more = f", {self.options}" if self.options else ""
+        return f"{self.scene}, level {self.level}, {self.cells} cells{more}"
+
+
+def read(folder):
+    """Groups of the newest commit, machine and launcher apart, by kind and ranks."""
+    records = [json.loads(line) for file in sorted(folder.glob("*.jsonl")) for line in file.read_text().splitlines()]
+    records = [record for record in records if record["exit_code"] == 0 and record["summary"]]
+    if not records:
+        return {}
+
+    def origin(record):
+        return [record["provenance"][key] for key in ("commit", "dirty", "cpu", "cores")]
+
+    newest = origin(max(records, key=lambda record: record["provenance"]["date"]))
+    kinds = {}
+    for record in records:
+        if origin(record) == newest:
+            kind = Kind(*(record[field] for field in Kind._fields))
+            kinds.setdefault((kind, record["ranks"]), []).append(record)
+    return {key: Group(of_kind) for key, of_kind in sorted(kinds.items())}
+
+
+class Curve:
+    """Runs of one kind of study on more and more ranks."""
+
+    def __init__(self, name, groups, weak):
+        self.name, self.groups, self.weak = name, groups, weak
+        self.ranks = sorted(groups)
+        self.timed = all(group.timed for group in groups.values())
+
+    def speed_up(self, ranks):
+        """Times the smallest number of ranks; where work grows with the ranks, of the work done in a second."""
+        first = self.ranks[0]
+        work = ranks / first if self.weak else 1
+        return work * first * self.groups[first].median() / self.groups[ranks].median()
+
+    def efficiency(self, ranks):
+        return self.speed_up(ranks) / ranks
+
+    def rows(self):
+        for ranks in self.ranks:
+            group = self.groups[ranks]
+            timed = [f"{self.speed_up(ranks):.2f}", f"{100 * self.efficiency(ranks):.0f} %"] if self.timed else ["", ""]
+            yield [
+                self.name if ranks == self.ranks[0] else "", ranks, thousands(group.count("primal_dofs")),
+                group.count("subdomains"), group.count("newton_iterations"), group.count("hessian_multiplications"),
+                group.seconds(lambda s: s["time_total"]), *timed, group.seconds(lambda s: s["peak_rss_mb"] / s["ranks"]),
+            ]
+
+
+def curves(groups):
+    """Strong and weak studies among the runs: those with more than one number of ranks."""
+    strong, weak = {}, {}
+    for (kind, ranks), group in groups.items():
+        if kind.width == 1:
+            strong.setdefault(kind, {})[ranks] = group
+        if kind.width == ranks:
+            weak.setdefault(kind._replace(width=1), {})[ranks] = group
+    found = [Curve(f"strong: {kind.name()}", of, weak=False) for kind, of in strong.items() if len(of) > 1]
+    return found + [Curve(f"weak: {kind.name()}", of, weak=True) for kind, of in weak.items() if len(of) > 1]
+
+
+def numerical(groups):
+    """Runs of one width on the most ranks, by scene, options and cells, then by level: where there are several levels."""
+    found = {}
+    for (kind, _), group in groups.items():
+        if kind.width == 1:
+            found.setdefault((kind.scene, kind.options, kind.cells), {})[kind.level] = group
+    return {key: of_levels for key, of_levels in found.items() if len(of_levels) > 1}
+
+
+def numerical_table(studies):
+    head = ["", "level", "subdomains", "primal unknowns", "dual unknowns", "Newton steps", "multiplications by F"]
+    head += ["a Newton step", "seconds", "ranks"]
+    rows = []
+    for (scene, options, cells), levels in studies.items():
+        for place, (level, group) in enumerate(sorted(levels.items())):
+            steps, products = group.count("newton_iterations"), group.count("hessian_multiplications")
+            name = Kind(scene, options, level, 1, cells).name().replace(f", level {level}", "")
+            rows.append(
+                ["" if place else name, level, thousands(group.count("subdomains")), thousands(group.count("primal_dofs"))]
+                + [thousands(group.count("dual_dofs")), steps, products, f"{products / steps:.1f}"]
+                + [group.seconds(lambda s: s["time_total"]), group.first["ranks"]]
+            )
+    return table(head, rows)
+
+
+PARTS = ["factorisation", "dual operator", "preconditioner", "coarse problem", "inner products", "internal forces"]
+"""Phases that have a colour of their own, with what belongs to them."""
+WITH = {"factorisation of the interior": "factorisation", "symbolic analysis": "factorisation", "coarse set-up": "coarse problem"}
+
+
+def phases(group):
+    """Seconds of the run of median time by part; phases are on their slowest rank, what is left is other."""
+    summary = group.summaries[(len(group.summaries) - 1) // 2]
+    found = dict.fromkeys(PARTS, 0.0)
+    for phase, seconds in summary["time"].items():
+        part = WITH.get(phase, phase)
+        if part in found:
+            found[part] += seconds
+    return found | {"other": max(0.0, summary["time_total"] - sum(found.values()))}
+
+
+def plots(folder, studies, of_levels):
+    """Files and their text."""
+    found = {}
+    timed = [study for study in studies if study.timed]
+    if timed:
+        ranks = sorted({p for study in timed for p in study.ranks})
+        ideal = ("ideal", {p: p for p in ranks}, True)
+        series = [(short(study), {p: study.speed_up(p) for p in study.ranks}, False) for study in timed]
+        found["scaling-speedup.svg"] = plot.curves("Speed-up of the whole solve", "ranks", "speed-up", [ideal, *series])
+        ideal = ("ideal", dict.fromkeys(ranks, 1.0), True)
+        series = [(short(study), {p: study.efficiency(p) for p in study.ranks}, False) for study in timed]
+        top = max(1.2, *(y for _, points, _ in series for y in points.values()))
+        found["scaling-efficiency.svg"] = plot.curves("Parallel efficiency", "ranks", "efficiency", [ideal, *series], y_top=top)
+        columns = [
+            (f"{'weak' if study.weak else 'strong'} {p}", phases(study.groups[p])) for study in timed for p in study.ranks
+        ]
+        found["scaling-phases.svg"] = plot.bars("Time per phase, on its slowest rank", "study and ranks", "seconds", columns)
+    memory = [
+        (short(study), {p: study.groups[p].first["peak_rss_mb"] / p for p in study.ranks}, False) for study in studies
+    ]
+    if memory:
+        found["scaling-memory.svg"] = plot.curves("Memory of a rank", "ranks", "MiB", memory)
+    counts = [
+        (f"{cells} cells", {g.count("subdomains"): g.count("hessian_multiplications") for g in levels.values()}, False)
+        for (_, _, cells), levels in of_levels.items()
+    ]
+    if counts:
+        title = "Multiplications by F, all Newton steps"
+        found["scaling-counts.svg"] = plot.curves(title, "subdomains", "multiplications", counts)
+    return {folder / name: text for name, text in found.items()}
+
+
+def short(study):
+    return study.name.split(",")[0].split(":")[0] + "," + study.name.split(",")[1]
+
+
+def contents(folder, raw):
+    """Every file this writes, with its text."""
+    groups = read(raw)
+    if not groups:
+        return {}
+    studies, of_levels = curves(groups), numerical(groups)
+    found = plots(folder, studies, of_levels)
+    text = [HEAD]
+    if not all(group.timed for group in groups.values()):
+        text.append(WHERE_BUSY)
+    if studies:
+        head = ["", "ranks", "primal unknowns", "subdomains", "Newton steps", "multiplications by F", "seconds", "speed-up"]
+        rows = [row for study in studies for row in study.rows()]
+        text += ["## Strong and weak\n", table([*head, "efficiency", "MiB a rank"], rows)]
+    if of_levels:
+        text += ["## Numerical\n", numerical_table(of_levels)]
+    text += [f"![{path.stem}]({path.name})\n" for path in found]
+    text += ["## Where the runs come from\n", circumstances(groups.values())]
+    return found | {folder / "scaling.md": "\n".join(text)}
+
+
+def write(folder, raw, only_check):
+    return replace(contents(folder, raw), only_check, "scripts/study write")
+
+
+def replace(files, only_check, command):
+    """Writes what has changed, or only tells."""
+    stale = []
+    for path, text in files.items():
+        if not path.exists() or path.read_text() != text:
+            stale.append(path.name)
+            if not only_check:
+                path.write_text(text)
+    if only_check and stale:
+        print(f"out of date: {', '.join(stale)}. Run {command}.", file=sys.stderr)
+        return 1
+    print(f"{'written' if stale else 'up to date'}: {', '.join(stale or [path.name for path in files])}")
+    return 0
