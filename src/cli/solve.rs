@@ -128,6 +128,7 @@ pub fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     describe_run(summary, &source, comm);
     summary.warnings = warnings(&scene, &discrete, comm);
     summary.mesh_reading_mb = discrete.reading_mb;
+    summary.provenance = solved.records.provenance.into_iter().filter(|(name, _)| name != "scene").collect();
     summary.cascade = rows;
     summary.time = table.max_seconds();
     summary.work = table.work();

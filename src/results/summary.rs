@@ -62,6 +62,8 @@ pub struct Summary {
     pub error: Option<String>,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Where the run comes from: the texts of the result file's `/provenance`, but for the scene itself.
+    pub provenance: BTreeMap<String, String>,
     /// One row an increment of the load.
     pub steps: Vec<StepRow>,
     /// One row a Newton step; those of attempts that failed included.

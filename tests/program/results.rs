@@ -119,6 +119,10 @@ fn assert_contract(summary: &Value) {
     reactions.values().for_each(|reaction| {
         crate::common::vector(reaction);
     });
+    let provenance = |name: &str| summary["provenance"][name].as_str().unwrap_or_else(|| panic!("no {name}"));
+    assert_eq!((provenance("ranks"), provenance("hosts").split(' ').count()), ("2", 2));
+    assert!(!provenance("commit").is_empty() && !provenance("hdf5_version").is_empty());
+    assert_eq!(summary["provenance"]["scene"], Value::Null, "it is in the result file, and long");
     let time = summary["time"].as_object().unwrap();
     assert!(time.len() > 3 && time.values().all(Value::is_number), "{time:?}");
 }
