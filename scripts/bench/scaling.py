@@ -20,9 +20,10 @@ largest; so is memory. Speed-up and efficiency are those of the medians, against
 from rest, without a cascade. Counts do not depend on the number of ranks. `cells` are those along the edge of a subdomain.
 """
 
+BUSY = " (machine busy: only counts mean something)"
 WHERE_BUSY = """
-**Other work ran beside some of these runs, or there were more ranks than cores: their times are left out of the tables, and
-the plots of times are missing.**
+**Other work ran beside some of these runs: their times are left out of the tables, and plots only show what they will look
+like.**
 """
 
 
@@ -62,10 +63,14 @@ def read(folder):
 class Curve:
     """Runs of one kind of study on more and more ranks."""
 
-    def __init__(self, name, groups, weak):
-        self.name, self.groups, self.weak = name, groups, weak
+    def __init__(self, kind, groups, weak):
+        self.kind, self.groups, self.weak = kind, groups, weak
+        self.name = f"{'weak' if weak else 'strong'}: {kind.name()}"
         self.ranks = sorted(groups)
         self.timed = all(group.timed for group in groups.values())
+
+    def short(self):
+        return "weak" if self.weak else f"level {self.kind.level}"
 
     def speed_up(self, ranks):
         """Times the smallest number of ranks; where work grows with the ranks, of the work done in a second."""
@@ -95,8 +100,8 @@ def curves(groups):
             strong.setdefault(kind, {})[ranks] = group
         if kind.width == ranks:
             weak.setdefault(kind._replace(width=1), {})[ranks] = group
-    found = [Curve(f"strong: {kind.name()}", of, weak=False) for kind, of in strong.items() if len(of) > 1]
-    return found + [Curve(f"weak: {kind.name()}", of, weak=True) for kind, of in weak.items() if len(of) > 1]
+    found = [Curve(kind, of, weak=False) for kind, of in strong.items() if len(of) > 1]
+    return found + [Curve(kind, of, weak=True) for kind, of in weak.items() if len(of) > 1]
 
 
 def numerical(groups):
@@ -124,7 +129,7 @@ def numerical_table(studies):
     return table(head, rows)
 
 
-PARTS = ["factorisation", "dual operator", "preconditioner", "coarse problem", "inner products", "internal forces"]
+PARTS = ["factorisation", "dual operator", "preconditioner", "coarse problem", "inner products", "assembly", "internal forces"]
 """Phases that have a colour of their own, with what belongs to them."""
 WITH = {"factorisation of the interior": "factorisation", "symbolic analysis": "factorisation", "coarse set-up": "coarse problem"}
 
@@ -143,22 +148,22 @@ def phases(group):
 def plots(folder, studies, of_levels):
     """Files and their text."""
     found = {}
-    timed = [study for study in studies if study.timed]
-    if timed:
-        ranks = sorted({p for study in timed for p in study.ranks})
+    note = "" if all(study.timed for study in studies) else BUSY
+    if studies:
+        ranks = sorted({p for study in studies for p in study.ranks})
         ideal = ("ideal", {p: p for p in ranks}, True)
-        series = [(short(study), {p: study.speed_up(p) for p in study.ranks}, False) for study in timed]
-        found["scaling-speedup.svg"] = plot.curves("Speed-up of the whole solve", "ranks", "speed-up", [ideal, *series])
+        series = [(study.short(), {p: study.speed_up(p) for p in study.ranks}, False) for study in studies]
+        found["scaling-speedup.svg"] = plot.curves(f"Speed-up of the whole solve{note}", "ranks", "speed-up", [ideal, *series])
         ideal = ("ideal", dict.fromkeys(ranks, 1.0), True)
-        series = [(short(study), {p: study.efficiency(p) for p in study.ranks}, False) for study in timed]
+        series = [(study.short(), {p: study.efficiency(p) for p in study.ranks}, False) for study in studies]
         top = max(1.2, *(y for _, points, _ in series for y in points.values()))
-        found["scaling-efficiency.svg"] = plot.curves("Parallel efficiency", "ranks", "efficiency", [ideal, *series], y_top=top)
-        columns = [
-            (f"{'weak' if study.weak else 'strong'} {p}", phases(study.groups[p])) for study in timed for p in study.ranks
-        ]
-        found["scaling-phases.svg"] = plot.bars("Time per phase, on its slowest rank", "study and ranks", "seconds", columns)
+        title = f"Parallel efficiency{note}"
+        found["scaling-efficiency.svg"] = plot.curves(title, "ranks", "efficiency", [ideal, *series], y_top=top)
+        columns = [(f"{study.short()} on {p}", phases(study.groups[p])) for study in studies for p in study.ranks]
+        title = f"Time per phase, on its slowest rank{note}"
+        found["scaling-phases.svg"] = plot.bars(title, "study on ranks", "seconds", columns)
     memory = [
-        (short(study), {p: study.groups[p].first["peak_rss_mb"] / p for p in study.ranks}, False) for study in studies
+        (study.short(), {p: study.groups[p].first["peak_rss_mb"] / p for p in study.ranks}, False) for study in studies
     ]
     if memory:
         found["scaling-memory.svg"] = plot.curves("Memory of a rank", "ranks", "MiB", memory)
@@ -170,10 +175,6 @@ def plots(folder, studies, of_levels):
         title = "Multiplications by F, all Newton steps"
         found["scaling-counts.svg"] = plot.curves(title, "subdomains", "multiplications", counts)
     return {folder / name: text for name, text in found.items()}
-
-
-def short(study):
-    return study.name.split(",")[0].split(":")[0] + "," + study.name.split(",")[1]
 
 
 def contents(folder, raw):
