@@ -231,7 +231,8 @@ nested dissection promises (set-up with S^2, solve with S^4/3).
 
 
 def contents(folder, raw):
-    groups = [group for group in scaling.read(raw).values() if group.first["work"].get("preconditioner")]
+    """Every file this writes, with its text; nothing from runs that other work ran beside."""
+    groups = [group for group in scaling.read(raw).values() if group.timed and group.first["work"].get("preconditioner")]
     cells = max((group.records[0]["cells"] for group in groups), default=None)
     groups = [group for group in groups if group.records[0]["cells"] == cells]
     if len({group.first["subdomains"] for group in groups}) < 2:
@@ -240,8 +241,6 @@ def contents(folder, raw):
     known, held = split(groups)
     units = calibrate(known, coarse)
     text = [HEAD.format(latency=1e6 * network.latency, rate=1e-9 / network.seconds_per_byte, measured=coarse.measured)]
-    if not all(group.timed for group in groups):
-        text.append("**Other work ran beside some of these runs, so that unit costs are too high and errors too large.**\n")
     text += ["## Unit costs, and runs held back\n", *validation(units, known, held, coarse)]
     weak, strong, plots, words = predictions(groups, units, coarse, network)
     text += [f"## Weak: {A_CORE} subdomains of {cells}^3 cells on every core\n", weak, "![Weak](model-weak.svg)\n"]

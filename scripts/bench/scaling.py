@@ -213,5 +213,6 @@ def replace(files, only_check, command):
     if only_check and stale:
         print(f"out of date: {', '.join(stale)}. Run {command}.", file=sys.stderr)
         return 1
-    print(f"{'written' if stale else 'up to date'}: {', '.join(stale or [path.name for path in files])}")
+    names = stale or [path.name for path in files] or ["nothing, for there are no such runs"]
+    print(f"{'written' if stale else 'up to date'}: {', '.join(names)}")
     return 0

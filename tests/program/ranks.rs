@@ -14,8 +14,17 @@ const COARSE: [&str; 3] =
     ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
 
 /// Keys of the summary that may depend on the number of ranks or on the clock.
-const OF_THE_RUN: [&str; 9] =
-    ["ranks", "time", "work", "communication", "time_total", "peak_rss_mb", "mesh_reading_mb", "warnings", "provenance"];
+const OF_THE_RUN: [&str; 9] = [
+    "ranks",
+    "time",
+    "work",
+    "communication",
+    "time_total",
+    "peak_rss_mb",
+    "mesh_reading_mb",
+    "warnings",
+    "provenance",
+];
 
 /// The summary but for what belongs to the run.
 fn result(run: &Run) -> Map<String, Value> {
