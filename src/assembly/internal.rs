@@ -124,6 +124,30 @@ fn answers_of<const N: usize, const P: usize>(
         .collect()
 }
 
+/// `Psi(u + change) - Psi(u) - F(u)'change >= 0` (energy), without cancellation.
+pub fn divergence(subdomain: &Subdomain, material: &Material, history: &[History], u: &[f64], change: &[f64]) -> f64 {
+    by_kind!(subdomain.elements.kind(), divergence_of(subdomain, material, history, u, change))
+}
+
+fn divergence_of<const N: usize, const P: usize>(
+    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
+    subdomain: &Subdomain,
+    material: &Material,
+    history: &[History],
+    u: &[f64],
+    change: &[f64],
+) -> f64 {
+    let mut sum = 0.0;
+    for (index, (nodes, points)) in integrated(points, &subdomain.elements, &subdomain.points).enumerate() {
+        let (u, change) = (displacements(u, nodes), displacements(change, nodes));
+        for (k, point) in points.iter().enumerate() {
+            let history = committed(history, P * index + k);
+            sum += point.weight * material.divergence(&point.strain(&u), &point.strain(&change), history);
+        }
+    }
+    sum
+}
+
 /// Commits the step that ends at `u`.
 pub fn commit(subdomain: &Subdomain, material: &Material, u: &[f64], history: &mut Vec<History>) {
     by_kind!(subdomain.elements.kind(), commit_of(subdomain, material, u, history))

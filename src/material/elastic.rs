@@ -1,7 +1,7 @@
 //! Hooke's law: stress = lambda tr(strain) 1 + 2 mu strain.
 
 use super::Material;
-use crate::tensor::Tangent;
+use crate::tensor::{Tangent, Voigt, deviator, stress_norm, trace};
 
 impl Material {
     /// The elastic stiffness C; with engineering shears its shear diagonal is mu.
@@ -15,12 +15,18 @@ impl Material {
         }
         c
     }
+
+    /// stress : C^-1 : stress (energy per volume).
+    pub fn complementary_square(&self, stress: &Voigt) -> f64 {
+        let (shear, mean) = (stress_norm(&deviator(stress)), trace(stress) / 3.0);
+        shear * shear / (2.0 * self.shear_modulus()) + mean * mean / self.bulk_modulus()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use crate::material::samples::STEEL;
-    use crate::tensor::apply;
+    use crate::tensor::{apply, contract};
 
     #[test]
     fn uniaxial_strain_state_gives_uniaxial_stress() {
@@ -28,6 +34,14 @@ mod tests {
         let stress = apply(&STEEL.elastic_tangent(), &[e, -nu * e, -nu * e, 0.0, 0.0, 0.0]);
         assert!((stress[0] - STEEL.young * e).abs() < 1e-10);
         assert!(stress[1..].iter().all(|s| s.abs() < 1e-10));
+    }
+
+    #[test]
+    fn the_complementary_square_is_that_of_the_strain_that_the_stress_takes() {
+        let strain = [1e-3, -2e-3, 0.5e-3, 0.7e-3, -1.1e-3, 0.3e-3];
+        let stress = apply(&STEEL.elastic_tangent(), &strain);
+        let expected = contract(&stress, &strain);
+        assert!((STEEL.complementary_square(&stress) - expected).abs() < 1e-14 * expected);
     }
 
     #[test]

@@ -10,13 +10,21 @@
 //! Psi = 1/2 strain_e : C_e : strain_e - f^2 / (2 (3 mu + H + C)),   D Psi = sigma
 //! ```
 //!
+//! Between two strains of one step from one state, with D = Psi(a) - Psi(b) - sigma(b) : (a - b) >= 0,
+//!
+//! ```text
+//! D >= r/2 (a - b) : C_e : (a - b),   r = (H + C) / (3 mu + H + C),   D >= 1/2 (sigma(a) - sigma(b)) : C_e^-1 : (sigma(a) - sigma(b))
+//! ```
+//!
+//! since the tangents are between r C_e and C_e (Nesterov, Introductory Lectures on Convex Optimization, 2.1.5 and 2.1.10).
+//!
 //! Psi is, but for a constant, the least over dkappa >= 0 of elastic energy + sigma_y dkappa + what isotropic and
 //! kinematic hardening store, hence convex and once differentiable: it counts what is stored elastically and what *this*
 //! step dissipates or stores by hardening, not what former steps did. The step is exact for radial paths from the
 //! committed state. No rate dependence, no plane stress.
 
 use super::Material;
-use crate::tensor::{Tangent, Voigt, deviator, trace};
+use crate::tensor::{Tangent, Voigt, contract, deviator, trace};
 
 /// What a material point remembers between load steps; zero is the virgin state. The back stress follows from the
 /// plastic strain.
@@ -109,6 +117,11 @@ impl Trial {
     }
 }
 
+/// The shears' share of the double contraction of two stress-like tensors, once.
+fn contract_shears(a: &Voigt, b: &Voigt) -> f64 {
+    a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+}
+
 impl Material {
     /// 3 mu + H + C: what the equivalent stress falls by, beyond the yield surface, for a unit of plastic strain.
     fn plastic_modulus(&self) -> f64 {
@@ -159,6 +172,40 @@ impl Material {
             }
         }
         c
+    }
+
+    /// Psi(strain + change) - Psi(strain) - sigma(strain) : change, energy per volume: how far Psi is above its tangent. As
+    /// accurate for small changes as for large ones.
+    pub fn divergence(&self, strain: &Voigt, change: &Voigt, committed: &History) -> f64 {
+        let trial = Trial::new(self, strain, committed);
+        let (mu, volume, d) = (self.shear_modulus(), trace(change), deviator(change));
+        let s = [2.0 * mu * d[0], 2.0 * mu * d[1], 2.0 * mu * d[2], mu * d[3], mu * d[4], mu * d[5]];
+        let square = equivalent(&s).powi(2);
+        let elastic = 0.5 * self.bulk_modulus() * volume * volume + square / (6.0 * mu);
+        let moved: Voigt = std::array::from_fn(|i| trial.relative[i] + s[i]);
+        let (before, after) = (trial.equivalent, equivalent(&moved));
+        let excess = (after - trial.yield_stress).max(0.0);
+        if excess == 0.0 && trial.excess == 0.0 {
+            return elastic;
+        }
+        // The equivalent stress q grows by (2 along + square) / (after + before); to first order by along / before.
+        let along = 1.5 * (contract(&trial.relative, &s) + contract_shears(&trial.relative, &s));
+        let growth = (2.0 * along + square) / (after + before);
+        let (of_excess, beyond) = match (trial.excess > 0.0, excess > 0.0) {
+            (true, true) => (growth, 0.0),
+            _ => (excess - trial.excess, excess - trial.excess - growth),
+        };
+        let curved = if before > 0.0 { (square * before - along * growth) / (before * (after + before)) } else { 0.0 };
+        let softer = of_excess * of_excess + 2.0 * trial.excess * (beyond + curved);
+        (elastic - softer / (2.0 * self.plastic_modulus())).max(0.0)
+    }
+
+    /// (H + C) / (3 mu + H + C): the least that tangents are of the elastic stiffness; 1 for an elastic material.
+    pub fn least_tangent(&self) -> f64 {
+        match self.yield_stress {
+            Some(_) => (self.hardening + self.kinematic_hardening) / self.plastic_modulus(),
+            None => 1.0,
+        }
     }
 
     /// The history at the end of the step, to be committed once the load step has converged.

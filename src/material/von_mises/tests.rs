@@ -256,3 +256,47 @@ fn without_a_yield_stress_nothing_yields() {
     close(response.energy, 0.5 * contract(&expected, &strain), 1e-14);
     assert_eq!(elastic.commit(&strain, &History::default()), History::default());
 }
+
+#[test]
+fn the_divergence_is_the_potential_above_its_tangent_and_within_its_bounds() {
+    let mut random = Random::new(11);
+    for (material, strain, history) in states() {
+        let step: Voigt = random.vector(1.0);
+        let c = material.elastic_tangent();
+        for size in [1e-2, 1e-4, 1e-9] {
+            let change: Voigt = step.map(|x| size * x);
+            let (at, to) = (material.respond(&strain, &history), moved(&strain, &step, size));
+            let there = material.respond(&to, &history);
+            let found = material.divergence(&strain, &change, &history);
+            let elastic = 0.5 * contract(&apply(&c, &change), &change);
+            let terms = at.energy.abs() + there.energy.abs() + elastic;
+            let expected = there.energy - at.energy - contract(&at.stress, &change);
+            assert!((found - expected).abs() <= 1e-11 * elastic + 1e-13 * terms, "{size}: {found} {expected}");
+            assert!(found <= (1.0 + 1e-12) * elastic);
+            assert!(found >= (material.least_tangent() - 1e-12) * elastic, "{size}: {found} {elastic}");
+            let difference: Voigt = std::array::from_fn(|i| there.stress[i] - at.stress[i]);
+            let of_stress = 0.5 * material.complementary_square(&difference);
+            let rounding = 1e-12 * (elastic * terms).sqrt();
+            assert!(found >= of_stress - 1e-12 * elastic - rounding, "{size}: {found} {of_stress}");
+        }
+    }
+}
+
+/// Where no yield surface is near, a small change sees half the tangent.
+#[test]
+fn for_small_changes_the_divergence_is_half_the_tangent() {
+    let mut random = Random::new(12);
+    let mut tested = 0;
+    for (material, strain, history) in states() {
+        let change: Voigt = random.vector(1e-10);
+        let (at, there) =
+            (material.respond(&strain, &history), material.respond(&moved(&strain, &change, 1e4), &history));
+        if at.plastic != there.plastic || material.least_tangent() < 1e-2 {
+            continue;
+        }
+        let half = 0.5 * contract(&apply(&material.tangent(&strain, &history), &change), &change);
+        close(material.divergence(&strain, &change, &history), half, 1e-6);
+        tested += 1;
+    }
+    assert!(tested > 50);
+}
