@@ -1,7 +1,7 @@
 //! fetiplast: contact of elasto-plastic bodies in 3D by Total-FETI domain decomposition on MPI.
 //!
 //! Data flows one way: [`scene`] -> [`mesh`] -> [`decomposition`] -> [`contact`] -> [`constraint`] -> [`assembly`] ->
-//! [`feti`] + [`qp`] -> [`newton`] -> [`results`]; [`study`] is the only file that sees every stage.
+//! [`feti`] + [`qp`] -> [`newton`] (with [`estimate`]) -> [`results`]; [`study`] is the only file that sees every stage.
 //! The method is the one of Cermak and Sysala, "Total-FETI method for solving contact elasto-plastic problems".
 
 pub mod analytic;
@@ -14,6 +14,7 @@ pub mod constraint;
 pub mod contact;
 pub mod decomposition;
 pub mod element;
+pub mod estimate;
 pub mod feti;
 pub mod material;
 pub mod mesh;

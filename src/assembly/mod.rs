@@ -6,6 +6,7 @@ pub mod internal;
 pub mod loads;
 pub mod pattern;
 pub mod stiffness;
+pub mod stress;
 
 use crate::element::{Nodal, Point};
 use crate::material::History;
@@ -38,6 +39,6 @@ fn committed(history: &[History], point: usize) -> &History {
 }
 
 #[cfg(test)]
-mod orders;
+pub(crate) mod orders;
 #[cfg(test)]
 mod tests;

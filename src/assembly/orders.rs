@@ -13,22 +13,22 @@ use crate::material::Material;
 use crate::mesh::Brick;
 use crate::tensor::{Voigt, apply, contract};
 
-const MATERIAL: Material = Material::elastic(1.0, 0.3);
+pub const MATERIAL: Material = Material::elastic(1.0, 0.3);
 const C: [f64; 3] = [1.0, -0.5, 0.7];
 
-fn exact(x: [f64; 3]) -> [f64; 3] {
+pub fn exact(x: [f64; 3]) -> [f64; 3] {
     C.map(|c| c * x.iter().map(|x| (PI * x).sin()).product::<f64>())
 }
 
-fn exact_strain(x: [f64; 3]) -> Voigt {
+pub fn exact_strain(x: [f64; 3]) -> Voigt {
     let [s, c] = [x.map(|x| (PI * x).sin()), x.map(|x| PI * (PI * x).cos())];
     let g = [c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]];
     let shear = |i: usize, j: usize| C[i] * g[j] + C[j] * g[i];
     [C[0] * g[0], C[1] * g[1], C[2] * g[2], shear(0, 1), shear(1, 2), shear(2, 0)]
 }
 
-/// `-(lambda + mu) grad div u - mu laplace u`.
-fn body_force(x: [f64; 3]) -> [f64; 3] {
+/// What the solution takes: `-(lambda + mu) grad div u - mu laplace u`.
+pub fn body_force(x: [f64; 3]) -> [f64; 3] {
     let (lambda, mu) = (MATERIAL.lambda(), MATERIAL.shear_modulus());
     let [s, c] = [x.map(|x| (PI * x).sin()), x.map(|x| (PI * x).cos())];
     let product: f64 = s.iter().product();
@@ -73,17 +73,55 @@ fn samples(kind: Kind, nodes: &[[f64; 3]]) -> Vec<Sample> {
     (0..27).map(sample).collect()
 }
 
-/// Errors in the energy norm and in the mean square of the displacement, with `cells` along each edge.
-fn errors(kind: Kind, cells: usize) -> [f64; 2] {
+/// The unit cube with so many cells along each edge.
+pub fn cube(kind: Kind, cells: usize) -> Subdomain {
     let brick = Brick { origin: [0.0; 3], size: [1.0; 3], cells: [cells; 3] };
     let bodies = number_bodies([(kind, Shape::Brick(brick))]);
     let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
     let elements: Vec<u64> = (0..bodies[0].counts().elements).collect();
-    let cube = Subdomain::of_brick(0, &torn, 0, &elements);
+    Subdomain::of_brick(0, &torn, 0, &elements)
+}
+
+/// The displacement of the cube under the body force, with these values at the nodes of its boundary.
+pub fn displacement(
+    cube: &Subdomain,
+    force: impl Fn([f64; 3]) -> [f64; 3],
+    exact: impl Fn([f64; 3]) -> [f64; 3],
+) -> Vec<f64> {
     let pattern = Pattern::new(cube.nodes.len(), &cube.elements, &[]);
     let mut k = vec![0.0; pattern.rows.len()];
-    stiffness::assemble(&cube, &MATERIAL, &[], &vec![0.0; cube.dofs()], &pattern, &mut k);
+    stiffness::assemble(cube, &MATERIAL, &[], &vec![0.0; cube.dofs()], &pattern, &mut k);
+    let mut f = vec![0.0; cube.dofs()];
+    for nodes in &cube.elements {
+        let places: Vec<[f64; 3]> = nodes.iter().map(|&n| cube.points[n as usize]).collect();
+        for Sample { weight, values, .. } in samples(cube.elements.kind(), &places) {
+            let force = force(sum(&values, &places));
+            for (&node, value) in nodes.iter().zip(values) {
+                (0..3).for_each(|i| f[3 * node as usize + i] += weight * value * force[i]);
+            }
+        }
+    }
+    let (mut held, mut u) = (vec![false; cube.dofs()], vec![0.0; cube.dofs()]);
+    for &node in &cube.boundary {
+        held[3 * node as usize..][..3].fill(true);
+        u[3 * node as usize..][..3].copy_from_slice(&exact(cube.points[node as usize]));
+    }
+    let mut ku = vec![0.0; u.len()];
+    pattern.multiply_add(&k, &u, &mut ku);
+    f.iter_mut().zip(&ku).for_each(|(f, ku)| *f -= ku);
+    let inside = solve(&pattern, &k, &f, &held);
+    u.iter_mut().zip(inside).for_each(|(u, v)| *u += v);
+    u
+}
 
+fn sum(weights: &[f64], vectors: &[[f64; 3]]) -> [f64; 3] {
+    std::array::from_fn(|i| weights.iter().zip(vectors).map(|(w, v)| w * v[i]).sum())
+}
+
+/// Errors in the energy norm and in the mean square of the displacement, with `cells` along each edge.
+fn errors(kind: Kind, cells: usize) -> [f64; 2] {
+    let cube = cube(kind, cells);
+    let u = displacement(&cube, body_force, exact);
     let of_elements: Vec<_> = cube
         .elements
         .iter()
@@ -92,22 +130,6 @@ fn errors(kind: Kind, cells: usize) -> [f64; 2] {
             (nodes, samples(kind, &places), places)
         })
         .collect();
-    let sum = |weights: &[f64], vectors: &[[f64; 3]]| -> [f64; 3] {
-        std::array::from_fn(|i| weights.iter().zip(vectors).map(|(w, v)| w * v[i]).sum())
-    };
-    let mut f = vec![0.0; cube.dofs()];
-    for (nodes, samples, places) in &of_elements {
-        for Sample { weight, values, .. } in samples {
-            let force = body_force(sum(values, places));
-            for (&node, value) in nodes.iter().zip(values) {
-                (0..3).for_each(|i| f[3 * node as usize + i] += weight * value * force[i]);
-            }
-        }
-    }
-    let mut held = vec![false; cube.dofs()];
-    cube.boundary.iter().for_each(|&node| held[3 * node as usize..][..3].fill(true));
-    let u = solve(&pattern, &k, &f, &held);
-
     let c = MATERIAL.elastic_tangent();
     let mut squares = [0.0; 2];
     for (nodes, samples, places) in &of_elements {

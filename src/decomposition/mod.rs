@@ -11,6 +11,7 @@ pub mod interface;
 pub mod metis;
 pub mod shares;
 pub mod subdomain;
+pub mod sums;
 pub mod twins;
 
 pub use interface::InterfaceNode;

@@ -24,6 +24,16 @@ pub fn values_at_points() -> [[f64; 10]; 4] {
     std::array::from_fn(|near| values(place(near)))
 }
 
+/// Barycentric coordinates of the integration points.
+pub fn places() -> [[f64; 4]; 4] {
+    std::array::from_fn(place)
+}
+
+/// At barycentric coordinates, a linear function is this combination of its values at the integration points.
+pub fn from_points(at: [f64; 4]) -> [f64; 4] {
+    at.map(|a| (a - FAR) / (NEAR - FAR))
+}
+
 /// Barycentric coordinates of the Gauss point near a corner.
 fn place(near: usize) -> [f64; 4] {
     std::array::from_fn(|a| if a == near { NEAR } else { FAR })
