@@ -19,6 +19,7 @@ use crate::constraint::Kind;
 use crate::contact::ContactError;
 use crate::decomposition::Cut;
 use crate::decomposition::bricks::Boxes;
+use crate::decomposition::sums::NodeSums;
 use crate::decomposition::twins::{alike, twins};
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
@@ -124,6 +125,7 @@ pub fn solve(
     let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains[..]);
     let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
     let space = RowSpace::new(comm, shares, constraints);
+    let sums = NodeSums::new(comm, decomposition);
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
     let mut coarse =
         timer.time("coarse set-up", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather));
@@ -154,6 +156,7 @@ pub fn solve(
         gather: &gather,
         coupling: RefCell::new(Coupling::new(constraints)),
         space: &space,
+        sums: &sums,
         yields: discrete.materials.iter().any(|m| m.yield_stress.is_some()),
     };
     let resultants = |stage: usize| recover::resultants(&problem, &coarse, &stages[stage].end.loads);
@@ -171,6 +174,7 @@ pub fn solve(
         tolerance: solver.newton_tolerance,
         residual: solver.residual_tolerance,
         limit: solver.newton_limit,
+        accuracy: solver.accuracy,
     };
     let operator = DualOperator::new(Factors::new(symbolic, precision), &gather);
     let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, twins(comm, subdomains));
@@ -199,7 +203,7 @@ pub fn solve(
         }
         Progress::Solution(at, solution) => {
             let contact = contact_states(problem, &discrete.pairs, solution);
-            fields::record(&mut piece, at.time(), problem, &solution.u, &discrete.pairs, &contact);
+            fields::record(&mut piece, at.time(), problem, solution, &discrete.pairs, &contact);
             rows.push(step_row(scene, discrete, problem, at, solution, &contact));
             closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
         }

@@ -32,6 +32,9 @@ pub struct Solve {
     /// none, lumped or dirichlet. Short for --set solver.preconditioner=...
     #[arg(long, value_name = "NAME")]
     preconditioner: Option<String>,
+    /// Stop when the algebraic error is at most this share of the discretisation error. Short for --set solver.accuracy=...
+    #[arg(long, value_name = "X")]
+    accuracy: Option<String>,
     /// Solve half the level first, and so on, and start from there: auto (where it pays), on or off.
     #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
     cascade: Cascade,
@@ -85,11 +88,12 @@ pub fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     let comm = &Metered::new(comm);
     let timer = Timer::start();
     let mut monitor = Monitor::of_rank(comm.rank(), arguments.progress);
-    let Solve { source, out, qp, preconditioner, cascade, .. } = arguments;
+    let Solve { source, out, qp, preconditioner, accuracy, cascade, .. } = arguments;
     let shorthand = |key: &str, value: Option<String>| value.map(|v| format!("solver.{key}={v}"));
     let mut sets = source.sets.clone();
     sets.extend(shorthand("qp", qp));
     sets.extend(shorthand("preconditioner", preconditioner));
+    sets.extend(shorthand("accuracy", accuracy));
     let found = find(&source, comm)?;
     let scene = found.at_level(source.level, &sets)?;
     let result = out.join(format!("{}.vtkhdf", run_name(&source)));
@@ -139,6 +143,7 @@ pub fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     let converged = summary.converged == Some(true);
     monitor.event(&Event::Phases(table.clone()));
     monitor.event(&Event::Residuals(summary.state.residuals));
+    monitor.event(&Event::Errors(summary.state.errors));
     monitor.event(&Event::Outcome {
         converged,
         newton_iterations: summary.newton_iterations.unwrap_or_default(),

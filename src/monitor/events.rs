@@ -1,7 +1,7 @@
 //! The events of a run.
 
 use super::timing::PhaseTable;
-use crate::results::summary::{ContactRow, NewtonRow, Residuals, Sizes};
+use crate::results::summary::{ContactRow, Errors, NewtonRow, Residuals, Sizes};
 
 /// Something that happened and is worth telling; numbers are those of all ranks together.
 #[derive(Clone, Debug)]
@@ -46,6 +46,8 @@ pub enum Event {
     Phases(PhaseTable),
     /// How well the equations hold in the end.
     Residuals(Residuals),
+    /// How exact the stress is.
+    Errors(Errors),
     /// The run is over.
     Outcome {
         /// Whether Newton's method converged.

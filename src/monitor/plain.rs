@@ -5,7 +5,7 @@
 
 use super::events::{Event, Sink};
 use super::timing::PhaseTable;
-use crate::results::summary::{ContactRow, NewtonRow, Residuals, Sizes};
+use crate::results::summary::{ContactRow, Errors, NewtonRow, Residuals, Sizes};
 
 /// Writes log lines.
 #[derive(Default)]
@@ -43,6 +43,7 @@ impl Plain {
             Event::Increment(place) => vec![place.clone()],
             Event::Phases(table) => phase_lines(table),
             Event::Residuals(residuals) => residual_lines(residuals),
+            Event::Errors(errors) => error_line(errors).into_iter().collect(),
             Event::Outcome { converged, newton_iterations, seconds, note } => {
                 let verdict = if *converged { "Converged" } else { "NOT converged" };
                 vec![format!("{verdict} in {newton_iterations} Newton steps, {seconds:.2} s. {note}").trim_end().into()]
@@ -132,6 +133,17 @@ fn residual_lines(residuals: &Residuals) -> Vec<String> {
     ["relative residuals".to_owned()].into_iter().chain(known).collect()
 }
 
+/// `error estimate  algebraic <= 1.2e-6, discretisation 4.1e-2 (stress, relative energy norm)`.
+fn error_line(errors: &Errors) -> Option<String> {
+    let (algebraic, discretisation) = (errors.algebraic?, errors.discretisation?);
+    let sign = if errors.algebraic_is_bound == Some(true) { "<=" } else { "about" };
+    let reason = if errors.ended_by_accuracy == Some(true) { ": enough for solver.accuracy" } else { "" };
+    Some(format!(
+        "error estimate  algebraic {sign} {algebraic:.1e}, discretisation {discretisation:.1e} (stress, relative energy \
+         norm){reason}"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -184,5 +196,23 @@ mod tests {
         let residuals = Residuals { equilibrium: Some(2e-9), ..Residuals::default() };
         let lines = Plain::default().lines(&Event::Residuals(residuals));
         assert_eq!(lines, ["relative residuals", "  equilibrium         2.000e-9"]);
+    }
+    #[test]
+    fn the_error_line_tells_bounds_from_estimates_and_what_ended_the_run() {
+        let line = |errors: Errors| Plain::default().lines(&Event::Errors(errors)).concat();
+        let errors = Errors {
+            algebraic: Some(1.23e-6),
+            algebraic_is_bound: Some(true),
+            discretisation: Some(0.0412),
+            ended_by_accuracy: Some(false),
+            ..Errors::default()
+        };
+        let bound = "error estimate  algebraic <= 1.2e-6, discretisation 4.1e-2 (stress, relative energy norm)";
+        assert_eq!(line(errors), bound);
+        let ended = Errors { ended_by_accuracy: Some(true), ..errors };
+        assert_eq!(line(ended), format!("{bound}: enough for solver.accuracy"));
+        let perfect = Errors { algebraic_is_bound: Some(false), ..errors };
+        assert!(line(perfect).contains("algebraic about 1.2e-6"));
+        assert_eq!(line(Errors::default()), "");
     }
 }

@@ -3,10 +3,12 @@
 //! `J` is convex and every iterate is made feasible, so the step of the quadratic model is a descent direction and the
 //! method, damped by `J`, converges from anywhere. [`step`] is the only place where FETI and the QP solvers meet.
 
+pub mod certificate;
 pub mod committed;
 pub mod damping;
 pub mod dual;
 pub mod equilibrium;
+pub mod errors;
 pub mod forcing;
 pub mod loading;
 pub mod motion;
@@ -16,7 +18,9 @@ pub mod recover;
 pub mod residuals;
 pub mod step;
 
+pub use certificate::Certificate;
 pub use committed::Committed;
+pub use errors::Errors;
 pub use problem::TornProblem;
 pub use program::{Method, ProgramSettings};
 pub use residuals::Residuals;
@@ -39,12 +43,14 @@ pub struct Settings {
     pub residual: f64,
     /// Steps at most.
     pub limit: usize,
+    /// An algebraic error of this share of the discretisation error is small enough, whatever the other two say.
+    pub accuracy: Option<f64>,
 }
 
 /// How the iteration ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// Both criteria are met.
+    /// Both criteria are met, or the accuracy is.
     Converged,
     /// The allowed steps are used up.
     LimitReached,
@@ -125,6 +131,10 @@ pub struct Solution {
     pub steps: Vec<StepRecord>,
     /// Residuals of the glued problem at `u`.
     pub residuals: Residuals,
+    /// How exact it is; `None` without a step, or where numbers are not finite.
+    pub errors: Option<Errors>,
+    /// Whether the accuracy ended the iteration, before the criteria were met.
+    pub ended_by_accuracy: bool,
     /// `J(u)`.
     pub energy: f64,
     /// `Psi(u)`.
@@ -165,9 +175,10 @@ pub fn solve(
     let mut admissible = problem.is_admissible(&u);
     let mut forcing = Forcing::default();
     let mut attempts: Vec<step::Step> = Vec::new();
+    let (mut errors, mut ended_by_accuracy) = (None, false);
     let outcome = loop {
         let watch = timer.total_seconds();
-        if problem.is_linear() {
+        if problem.is_linear() && settings.accuracy.is_none() {
             forcing.drop = solver.linear_drop();
         }
         let step = match solver.solve(problem, (&u, &state), forcing, timer, &|n| alive(steps.len() + 1, n)) {
@@ -228,6 +239,14 @@ pub fn solve(
         if close && residuals.largest() <= settings.residual {
             break Outcome::Converged;
         }
+        if let Some(accuracy) = settings.accuracy {
+            let found = solver.errors(problem, (&u, &state), &lambda, timer);
+            ended_by_accuracy = found.algebraic <= accuracy * found.discretisation;
+            if ended_by_accuracy {
+                errors = Some(found);
+                break Outcome::Converged;
+            }
+        }
         if step.outcome == qp::Outcome::LimitReached {
             break Outcome::Inner(step.outcome);
         }
@@ -235,12 +254,17 @@ pub fn solve(
             break Outcome::LimitReached;
         }
     };
+    if errors.is_none() && !steps.is_empty() && state.energy.is_finite() {
+        errors = Some(solver.errors(problem, (&u, &state), &lambda, timer));
+    }
     Solution {
         u,
         lambda,
         outcome,
         steps,
         residuals,
+        errors,
+        ended_by_accuracy,
         energy: state.energy,
         internal_energy: state.internal_energy,
         external_work: state.external_work,

@@ -6,6 +6,7 @@ use super::committed::Committed;
 use crate::assembly::internal::{self, Terms};
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::Subdomain;
+use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
 use crate::feti::coupling::Coupling;
 use crate::feti::gather::Gather;
@@ -35,6 +36,8 @@ pub struct TornProblem<'a> {
     pub coupling: RefCell<Coupling>,
     /// Inner products and sums.
     pub space: &'a RowSpace<'a>,
+    /// Sums around nodes.
+    pub sums: &'a NodeSums<'a>,
     /// Whether any material of the scene yields.
     pub yields: bool,
 }

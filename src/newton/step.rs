@@ -44,10 +44,10 @@ pub struct Step {
 
 /// What is kept from step to step: factors, projector, multipliers.
 pub struct StepSolver<'a> {
-    operator: DualOperator<'a>,
-    projector: Projector<'a>,
+    pub(super) operator: DualOperator<'a>,
+    pub(super) projector: Projector<'a>,
     preconditioner: Option<Preconditioner<'a>>,
-    programs: Programs,
+    pub(super) programs: Programs,
     /// Congruent subdomains have the same number.
     twins: Vec<Option<usize>>,
     /// Lower values of each own subdomain's tangent, as it was factorised.

@@ -6,7 +6,7 @@ use crate::contact::ContactPair;
 use crate::decomposition::Subdomain;
 use crate::element::Kind;
 use crate::feti::Torn;
-use crate::newton::TornProblem;
+use crate::newton::{Solution, TornProblem};
 
 /// VTK's number of a kind of cell.
 fn vtk_type(kind: Kind) -> u8 {
@@ -56,10 +56,11 @@ pub fn record(
     piece: &mut Piece,
     time: f64,
     problem: &TornProblem,
-    u: &Torn,
+    solution: &Solution,
     pairs: &[ContactPair],
     contact: &[ContactState],
 ) {
+    let u = &solution.u;
     let (mut displacement, mut pressure, mut gap, mut status) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (subdomain, u) in problem.subdomains.iter().zip(u) {
         displacement.extend(u.chunks_exact(3).map(|u| [u[0], u[1], u[2]]));
@@ -75,7 +76,15 @@ pub fn record(
         Field::scalar("contact_gap", gap),
         Field::integer("contact_status", status),
     ];
-    let cell_data = vec![Field::scalar("von_mises", stress), Field::scalar("equivalent_plastic_strain", plastic)];
+    let estimate = match &solution.errors {
+        Some(errors) => errors.elements.concat(),
+        None => vec![f64::NAN; piece.types.len()],
+    };
+    let cell_data = vec![
+        Field::scalar("von_mises", stress),
+        Field::scalar("equivalent_plastic_strain", plastic),
+        Field::scalar("error_estimate", estimate),
+    ];
     piece.record(time, point_data, cell_data);
 }
 

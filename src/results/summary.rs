@@ -119,6 +119,27 @@ pub struct State {
     /// How well the equations hold.
     #[serde(flatten)]
     pub residuals: Residuals,
+    /// How far the stress is from what it should be.
+    #[serde(flatten)]
+    pub errors: Errors,
+}
+
+/// Errors of the stress in the norm of its complementary energy, relative to the stress.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Errors {
+    /// Bound on `J(u)` less its minimum on this mesh.
+    pub duality_gap: Option<f64>,
+    /// Bound on the distance from the solution on this mesh.
+    #[serde(rename = "error_algebraic")]
+    pub algebraic: Option<f64>,
+    /// Whether it is a bound; with perfect plasticity it is an estimate.
+    #[serde(rename = "error_algebraic_is_bound")]
+    pub algebraic_is_bound: Option<bool>,
+    /// Estimated distance of the solution on this mesh from the exact one.
+    #[serde(rename = "error_discretisation")]
+    pub discretisation: Option<f64>,
+    /// Whether the solver stopped because the first was small beside the second.
+    pub ended_by_accuracy: Option<bool>,
 }
 
 /// The end of an increment.

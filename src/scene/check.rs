@@ -258,7 +258,8 @@ fn solver(solver: &Solver) -> Checked {
         ("solver.residual_tolerance", solver.residual_tolerance),
         ("solver.qp_tolerance", solver.qp_tolerance),
     ];
-    for (key, value) in tolerances {
+    let accuracy = solver.accuracy.map(|value| ("solver.accuracy", value));
+    for (key, value) in tolerances.into_iter().chain(accuracy) {
         require(value > 0.0 && value < 1.0, key, value, "a relative tolerance must be above 0 and below 1")?;
     }
     for (key, value) in [("solver.newton_limit", solver.newton_limit), ("solver.qp_limit", solver.qp_limit)] {

@@ -10,6 +10,10 @@ pub struct Solver {
     pub newton_tolerance: f64,
     /// ... and the true residual of the nonlinear problem is this small too.
     pub residual_tolerance: f64,
+    /// Newton stops, whatever these say, when the algebraic error is at most this share of the discretisation error. Without it
+    /// they decide.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<f64>,
     /// Newton steps at most.
     pub newton_limit: usize,
     /// How exactly a quadratic program is solved.
@@ -32,6 +36,7 @@ impl Default for Solver {
         Solver {
             newton_tolerance: 1e-4,
             residual_tolerance: 1e-6,
+            accuracy: None,
             newton_limit: 50,
             qp_tolerance: 1e-7,
             qp_limit: 5000,

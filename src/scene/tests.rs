@@ -457,7 +457,7 @@ fn the_method_follows_the_keys() {
 
 #[test]
 fn solver_settings_are_checked() {
-    for key in ["newton_tolerance", "residual_tolerance", "qp_tolerance"] {
+    for key in ["newton_tolerance", "residual_tolerance", "qp_tolerance", "accuracy"] {
         for value in ["0", "1", "-1e-4", "nan", "inf"] {
             refuses(&[&format!("solver.{key}={value}")], &[&format!("solver.{key} = "), "above 0 and below 1"]);
         }

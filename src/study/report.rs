@@ -179,6 +179,13 @@ fn state(discrete: &Discrete, problem: &TornProblem, solution: &Solution, contac
             gap: Some(solution.residuals.gap),
             complementarity: Some(solution.residuals.complementarity),
         },
+        errors: summary::Errors {
+            duality_gap: solution.errors.as_ref().map(|errors| errors.gap),
+            algebraic: solution.errors.as_ref().map(|errors| errors.algebraic),
+            algebraic_is_bound: solution.errors.as_ref().map(|errors| errors.is_bound),
+            discretisation: solution.errors.as_ref().map(|errors| errors.discretisation),
+            ended_by_accuracy: Some(solution.ended_by_accuracy),
+        },
     }
 }
 

@@ -1,0 +1,178 @@
+//! How far a displacement is from the minimum of `J` on its mesh: a bound from the duality gap.
+//!
+//! For any torn `v` and any `lambda` with `lambda_I >= 0`, `R'(f - B'lambda) = 0`, weak duality and the strong convexity of
+//! `Psi` on each subdomain (`r` times the elastic energy, [`crate::material::Material::least_tangent`]) give, with the forces
+//! `rho = f - B'lambda - F(v)` that are not in equilibrium,
+//!
+//! ```text
+//! min J >= inf_w Psi(w) - f'w + lambda'(B w - c) >= Psi(v) - f'v + lambda'(B v - c) - sum_s rho_s'K_e,s^+ rho_s / 2 r_s.
+//! ```
+//!
+//! Subtracted from `J(u)` of an admissible `u`, that is
+//!
+//! ```text
+//! J(u) - min J <= gap = lambda_I'(c - B u)_I  +  [Psi(u) - Psi(v) - F(v)'(u - v)]  +  sum_s rho_s'K_s^+ rho_s / 2 r_s
+//! ```
+//!
+//! where every term is positive and is computed without cancellation, and where `K_s` may be any tangent, as tangents are at
+//! most `K_e` and so `K_e^+` is at most `K_s^+` on forces in balance. We start from `v = u`, where the bracket is zero, and
+//! let `v = v + K^+ rho`: Newton's method for the torn bodies under the forces `lambda`, whose `rho` vanishes quadratically, so
+//! that the gap tends to the true duality gap of `u` and `lambda`. In linear elasticity (`r = 1`, `K = K_e`) the first value is
+//! that already. Each turn costs one `K^+` and no conjugate gradients; there are four at most, and the least value counts.
+//!
+//! The gap bounds the error of the stress without a constant, and that of the displacement with one:
+//!
+//! ```text
+//! int (sigma - sigma_min) : C^-1 : (sigma - sigma_min) <= 2 gap,      r |u - u_min|_e^2 <= 2 gap,   r the least of all bodies
+//! ```
+//!
+//! as `J(u) - min J >= Psi(u) - Psi(u_min) - F(u_min)'(u - u_min)`, see [`crate::material::von_mises`]. Under perfect
+//! plasticity `r = 0`: what is left of `rho` is weighted as if the tangent stayed, and the value is an estimate. All is up to
+//! rounding: of `B u`, and of the factors, for which a hundredth is added.
+
+use super::StepSolver;
+use super::problem::{State, TornProblem, dot};
+use super::recover;
+use crate::assembly::internal;
+use crate::feti::Torn;
+use crate::feti::face::CoarseFace;
+use crate::monitor::timing::Timer;
+
+/// Turns of Newton's method for the torn bodies.
+const TURNS: usize = 4;
+/// It ends when perfect knowledge of `r` could lower the bound by no more than this share.
+const SHARP: f64 = 0.05;
+/// Relative error of `rho'K^+ rho`: ten times what a factor in single precision may fail its probe by.
+const FACTORS: f64 = 0.01;
+/// Contact forces below this share of the largest, and forces out of balance below this share of all, are rounding.
+const ROUNDING: f64 = 1e-12;
+/// Attempts to balance multipliers without pulling.
+const BALANCINGS: usize = 10;
+
+/// A bound on `J(u) - min J`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certificate {
+    /// The bound (energy).
+    pub gap: f64,
+    /// Whether it is one: with hardening, or without plastic material.
+    pub is_bound: bool,
+    /// Applications of `K^+` that it took.
+    pub solves: usize,
+}
+
+impl Certificate {
+    /// Bound on the error of the stress, `sqrt(int (sigma - sigma_min) : C^-1 : (sigma - sigma_min))` (root of energy).
+    pub fn stress_error(&self) -> f64 {
+        (2.0 * self.gap).sqrt()
+    }
+}
+
+impl StepSolver<'_> {
+    /// Bounds `J(u) - min J` for an admissible `u`, by the multipliers of the last step and its factors. Collective.
+    pub fn certify(
+        &mut self,
+        problem: &TornProblem,
+        (u, state): (&Torn, &State),
+        lambda: &[f64],
+        timer: &Timer,
+    ) -> Certificate {
+        let (lambda, balanced) = timer.time("coarse problem", || self.balance(problem, lambda));
+        let pull: Vec<f64> = lambda
+            .iter()
+            .zip(&problem.constraints.rows)
+            .map(|(l, row)| l * f64::from(u8::from(row.is_inequality())))
+            .collect();
+        let open = problem.space.dots(&[(&pull, &problem.slack(u))])[0].max(0.0);
+
+        let (mut v, mut change) = (u.clone(), problem.gather.zeros());
+        let mut rho = problem.unbalance(state);
+        problem.gather.add_transpose(-1.0, &lambda, &mut rho);
+        let mut best = Certificate { gap: f64::INFINITY, is_bound: balanced, solves: 0 };
+        let mut estimate = f64::INFINITY;
+        for solves in 1..=TURNS {
+            let mut correction = rho.clone();
+            timer.time("certificate", || self.operator.factors.solve(&mut correction));
+            let mut partial = Vec::with_capacity(3 * u.len());
+            timer.time("certificate", || {
+                for (own, subdomain) in problem.subdomains.iter().enumerate() {
+                    let (material, history) = (&problem.materials[own], problem.committed.history(own));
+                    let moved = if solves == 1 {
+                        0.0
+                    } else {
+                        internal::divergence(subdomain, material, history, &v[own], &change[own])
+                    };
+                    let square = (1.0 + FACTORS) * dot(&rho[own], &correction[own]);
+                    let weighted = if square > 0.0 { square / material.least_tangent() } else { 0.0 };
+                    partial.extend([moved, square, weighted]);
+                }
+            });
+            let sum = problem.space.sum(&partial, 3);
+            let (least, most) = (open + sum[0] + 0.5 * sum[1], open + sum[0] + 0.5 * sum[2]);
+            best.solves = solves;
+            best.gap = best.gap.min(most);
+            estimate = least;
+            if most - least <= SHARP * most || !least.is_finite() {
+                break;
+            }
+            timer.time("certificate", || {
+                for (own, subdomain) in problem.subdomains.iter().enumerate() {
+                    v[own].iter_mut().zip(&correction[own]).for_each(|(v, c)| *v += c);
+                    change[own].iter_mut().zip(&correction[own]).for_each(|(d, c)| *d -= c);
+                    let (material, history) = (&problem.materials[own], problem.committed.history(own));
+                    let mut forces = vec![0.0; v[own].len()];
+                    internal::add_forces(subdomain, material, history, &v[own], &mut forces);
+                    rho[own].clone_from(&problem.loads[own]);
+                    rho[own].iter_mut().zip(forces).for_each(|(r, f)| *r -= f);
+                }
+                problem.gather.add_transpose(-1.0, &lambda, &mut rho);
+            });
+        }
+        if !best.gap.is_finite() {
+            (best.gap, best.is_bound) = (estimate, false);
+        }
+        best
+    }
+
+    /// The nearest multipliers, or nearly so, that balance the loads on every subdomain and do not pull; and whether they do,
+    /// up to rounding.
+    fn balance(&self, problem: &TornProblem, lambda: &[f64]) -> (Vec<f64>, bool) {
+        let coarse = &self.projector.coarse;
+        let wanted = recover::resultants(problem, coarse, &problem.loads);
+        let is_contact = |row: usize| problem.constraints.rows[row].is_inequality();
+        let largest = |mine: f64| problem.space.maximum(mine);
+        let mut lambda = lambda.to_vec();
+        for attempt in 0..BALANCINGS {
+            let contacts = lambda.iter_mut().enumerate().filter(|(row, _)| is_contact(*row));
+            let most = largest(contacts.fold(0.0, |most, (_, l)| {
+                *l = l.max(0.0);
+                most.max(*l)
+            }));
+            let missing: Vec<f64> = wanted.iter().zip(coarse.apply(&lambda)).map(|(e, g)| e - g).collect();
+            let fresh;
+            // The rows of the last step have a factor.
+            let face = match self.programs.held().filter(|_| attempt == 0) {
+                Some(face) => face,
+                None => {
+                    let held = (0..lambda.len()).map(|row| !is_contact(row) || lambda[row] > ROUNDING * most);
+                    match CoarseFace::new(coarse, held.collect()) {
+                        Ok(face) => fresh = face,
+                        Err(_) => return (lambda, false),
+                    }
+                    &fresh
+                }
+            };
+            face.add_balance(coarse, missing, &mut lambda);
+            let contacts = lambda.iter().enumerate().filter(|(row, _)| is_contact(*row));
+            if largest(contacts.fold(0.0, |pull, (_, l)| pull.max(-l))) <= ROUNDING * most {
+                let norm = |squares: f64| squares.sqrt();
+                let left = norm(wanted.iter().zip(coarse.apply(&lambda)).map(|(e, g)| (e - g).powi(2)).sum());
+                let size = norm(problem.space.dots(&[(&lambda, &lambda)])[0]).max(norm(dot(&wanted, &wanted)));
+                return (lambda, left <= ROUNDING * size);
+            }
+        }
+        (lambda, false)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,83 @@
+//! The two errors of a solution: that of the solver, on its mesh, and that of the mesh. Both are of the stress, in the norm of
+//! its complementary energy, relative to the stress.
+
+use super::StepSolver;
+use super::problem::{SIGNIFICANT, State, TornProblem};
+use crate::estimate::{self, Estimate, Part};
+use crate::feti::Torn;
+use crate::monitor::timing::Timer;
+use crate::tensor::Voigt;
+
+/// How exact a solution is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Errors {
+    /// Bound on `J(u)` less its minimum on this mesh (energy).
+    pub gap: f64,
+    /// Distance from the solution on this mesh at most, see [`super::certificate`].
+    pub algebraic: f64,
+    /// Whether that is a bound; else an estimate.
+    pub is_bound: bool,
+    /// Distance of the solution on this mesh from the exact one, estimated, see [`crate::estimate`].
+    pub discretisation: f64,
+    /// Share of each element of each own subdomain in that: the squares of all add up to its square.
+    pub elements: Vec<Vec<f64>>,
+}
+
+impl TornProblem<'_> {
+    fn parts(&self) -> Vec<Part<'_>> {
+        let part = |own: usize| Part {
+            subdomain: &self.subdomains[own],
+            material: &self.materials[own],
+            history: self.committed.history(own),
+        };
+        (0..self.subdomains.len()).map(part).collect()
+    }
+
+    /// What errors are relative to, given the sum of squares of the stress.
+    fn stress_size(&self, squares: f64, state: &State) -> f64 {
+        squares.sqrt().max(SIGNIFICANT * state.terms.energy.sqrt())
+    }
+
+    /// True error of the stress at `u` relative to the stress that was found, in the norm of [`Errors`], where the exact stress
+    /// is known: given the index of a body, at a place. Over it, an estimate is its effectivity. Collective.
+    pub fn true_error(&self, u: &Torn, exact: &dyn Fn(usize, [f64; 3]) -> Voigt) -> f64 {
+        let parts = self.parts();
+        let Estimate { stresses, .. } = estimate::estimate(self.sums, &parts, u);
+        let partial: Vec<f64> =
+            estimate::true_squares(&parts, u, exact).into_iter().zip(stresses).flat_map(|(e, s)| [e, s]).collect();
+        let sum = self.space.sum(&partial, 2);
+        relative(sum[0].sqrt(), self.stress_size(sum[1], &self.evaluate(u)))
+    }
+}
+
+impl StepSolver<'_> {
+    /// The errors of an admissible displacement with the multipliers of the last step. Collective.
+    pub fn errors(
+        &mut self,
+        problem: &TornProblem,
+        (u, state): (&Torn, &State),
+        lambda: &[f64],
+        timer: &Timer,
+    ) -> Errors {
+        let certificate = self.certify(problem, (u, state), lambda, timer);
+        let Estimate { mut errors, stresses } =
+            timer.time("error estimate", || estimate::estimate(problem.sums, &problem.parts(), u));
+        let partial: Vec<f64> =
+            errors.iter().zip(stresses).flat_map(|(errors, stress)| [errors.iter().sum(), stress]).collect();
+        let sum = problem.space.sum(&partial, 2);
+        let size = problem.stress_size(sum[1], state);
+        errors.iter_mut().flatten().for_each(|square| *square = relative(square.sqrt(), size));
+        Errors {
+            gap: certificate.gap,
+            algebraic: relative(certificate.stress_error(), size),
+            is_bound: certificate.is_bound,
+            discretisation: relative(sum[0].sqrt(), size),
+            elements: errors,
+        }
+    }
+}
+
+/// `a / b`, and zero where there is nothing.
+fn relative(a: f64, b: f64) -> f64 {
+    if a == 0.0 { 0.0 } else { a / b }
+}
