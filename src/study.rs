@@ -35,7 +35,7 @@ use crate::feti::schur::Schur;
 use crate::feti::space::RowSpace;
 use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
-use crate::newton::loading::{self, Progress};
+use crate::newton::loading::{self, Entry, Observer, Progress};
 use crate::newton::{self, Committed, Method, ProgramSettings, Settings, StepRecord, StepSolver, TornProblem, Watch};
 use crate::newton::{equilibrium, recover};
 use crate::qp::mprgp::Expansion;
@@ -67,6 +67,29 @@ pub enum StudyError {
     /// Some body can move freely.
     #[error(transparent)]
     Floating(#[from] Floating),
+    /// Who was asked between two Newton steps wanted to stop.
+    #[error("stopped on request")]
+    Stopped,
+}
+
+/// How the solution of a scene begins.
+pub enum Begin {
+    /// From rest.
+    Rest,
+    /// Near its solution, which has no history.
+    Near(newton::Start),
+    /// Where another one stood.
+    At(Box<Standing>),
+}
+
+/// Where the solution of a scene stands between two Newton steps: all that the rest of it depends on.
+pub struct Standing {
+    /// In the load history.
+    pub halt: loading::Halt,
+    /// The increments reached so far.
+    pub rows: Vec<StepRow>,
+    /// Their fields; no mesh.
+    pub recorded: Piece,
 }
 
 /// What a solved scene gives.
@@ -119,6 +142,24 @@ pub fn solve(
     start: Option<newton::Start>,
     timer: &Timer,
     report: &mut dyn FnMut(Event),
+) -> Result<Solved, StudyError> {
+    let begin = start.map_or(Begin::Rest, Begin::Near);
+    solve_from(scene, discrete, comm, begin, timer, report, &|_| false)
+}
+
+/// As [`solve`]. Between two Newton steps `pause` is asked whether to stop there, and handed what it takes to go on; it is
+/// collective, too.
+///
+/// # Errors
+/// As there, and [`StudyError::Stopped`].
+pub fn solve_from(
+    scene: &Scene,
+    discrete: &Discrete,
+    comm: &dyn Comm,
+    begin: Begin,
+    timer: &Timer,
+    report: &mut dyn FnMut(Event),
+    pause: &dyn Fn(&dyn Fn() -> Standing) -> bool,
 ) -> Result<Solved, StudyError> {
     let started = SystemTime::now();
     let Discrete { decomposition, constraints, .. } = discrete;
@@ -185,13 +226,25 @@ pub fn solve(
     let number = Cell::new(1);
     let step = |record: &StepRecord| report.borrow_mut()(Event::NewtonStep(newton_row(number.get(), record)));
     let watch = Watch { timer, alive: &alive, step: &step };
-    // A scene that has a start has no history: the right-hand sides at its beginning are those of its end.
-    let start = start.map(|mut start| {
-        problem.make_admissible(&mut start.u);
-        start
-    });
     let mut piece = fields::mesh(subdomains, comm.rank());
+    let fixed = piece.cell_data.len();
     let (mut rows, mut closed): (Vec<StepRow>, Vec<u64>) = Default::default();
+    let entry = match begin {
+        Begin::Rest => Entry::Rest,
+        Begin::Near(mut start) => {
+            // Without a history the right-hand sides at its beginning are those of its end.
+            problem.make_admissible(&mut start.u);
+            Entry::Near(start)
+        }
+        Begin::At(standing) => {
+            let Standing { halt, rows: reached, recorded: Piece { times, point_data, cell_data, .. } } = *standing;
+            (rows, piece.times) = (reached, times);
+            piece.point_data.extend(point_data);
+            piece.cell_data.extend(cell_data);
+            Entry::At(Box::new(halt))
+        }
+    };
+    let reached = RefCell::new((piece, rows));
     let mut tell = |problem: &TornProblem, progress: Progress| match progress {
         Progress::Attempt(at) => {
             number.set(at.number);
@@ -203,12 +256,26 @@ pub fn solve(
         }
         Progress::Solution(at, solution) => {
             let contact = contact_states(problem, &discrete.pairs, solution);
-            fields::record(&mut piece, at.time(), problem, solution, &discrete.pairs, &contact);
+            let (piece, rows) = &mut *reached.borrow_mut();
+            fields::record(piece, at.time(), problem, solution, &discrete.pairs, &contact);
             rows.push(step_row(scene, discrete, problem, at, solution, &contact));
             closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
         }
     };
-    let followed = loading::follow(&mut problem, &mut steps, &settings, start, stages, &watch, &mut tell);
+    let pause = |halt: &dyn Fn() -> loading::Halt| {
+        pause(&|| {
+            let (Piece { times, point_data, cell_data, .. }, rows) = &*reached.borrow();
+            let (times, point_data, cell_data) = (times.clone(), point_data.clone(), cell_data[fixed..].to_vec());
+            let recorded = Piece { times, point_data, cell_data, ..Piece::default() };
+            Standing { halt: halt(), rows: rows.clone(), recorded }
+        })
+    };
+    let observer = Observer { tell: &mut tell, pause: &pause };
+    let followed = loading::follow(&mut problem, &mut steps, &settings, entry, &stages, &watch, observer);
+    if followed.failure.as_ref().is_some_and(|(_, outcome)| *outcome == newton::Outcome::Stopped) {
+        return Err(StudyError::Stopped);
+    }
+    let (piece, rows) = reached.into_inner();
 
     let summary = summarise(scene, discrete, &followed, rows, comm);
     let records = Records {

@@ -1,21 +1,23 @@
 //! What converged increments leave behind: the history of the material, and how large everything has been.
 
+use serde::{Deserialize, Serialize};
+
 use super::problem::TornProblem;
 use crate::assembly::internal;
 use crate::feti::Torn;
 use crate::material::History;
 
 /// The state that an increment starts from; by default that of rest.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Committed {
-    /// History of each element of each own subdomain; none where nothing ever yielded.
-    histories: Vec<Vec<History>>,
+    /// History of each integration point of each own subdomain; none where nothing ever yielded.
+    pub histories: Vec<Vec<History>>,
     /// What relative errors refer to where less is left.
     pub sizes: Sizes,
 }
 
 /// The largest values of the increments so far. An unloaded body keeps errors of the size of what was there.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sizes {
     /// `|u|_e` (root of energy).
     pub elastic_norm: f64,

@@ -4,6 +4,8 @@
 //! that follows the square of the residual's last decrease (Eisenstat and Walker 1996, choice 2). The tolerance of the
 //! scene is the floor, lowered where the true residual shows that it is not enough.
 
+use serde::{Deserialize, Serialize};
+
 /// Reduction of the gradient in the first step, and the least in later ones.
 const FIRST: f64 = 0.01;
 const LOOSEST: f64 = 0.03;
@@ -15,7 +17,7 @@ const SHARE: f64 = 0.5;
 const MARGIN: f64 = 0.3;
 
 /// Accuracy of a quadratic program.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Forcing {
     /// Reduce the first gradient of the program by this factor ...
     pub drop: f64,

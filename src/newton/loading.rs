@@ -4,8 +4,11 @@
 //! and tried again from the last committed state, and so are its parts up to a number of halvings. Each part begins and
 //! ends at the corners of its halving, so an increment that is reached is reached exactly.
 
+use super::committed::Committed;
 use super::problem::TornProblem;
-use super::{Outcome, Settings, Solution, Start, StepRecord, StepSolver, Watch, solve};
+use super::{Begin, Outcome, Settings, Solution, Standing, Start, StepRecord, StepSolver, Watch, solve};
+use serde::{Deserialize, Serialize};
+
 use crate::feti::Torn;
 
 /// What is prescribed at one time.
@@ -21,7 +24,7 @@ pub struct Conditions {
 pub struct Stage {
     /// What is prescribed at its end.
     pub end: Conditions,
-    /// Equal increments that lead there.
+    /// Equal increments that lead there, at least one.
     pub increments: usize,
     /// How often an increment may be halved.
     pub halvings: u32,
@@ -84,10 +87,77 @@ impl Conditions {
 }
 
 /// A part of an increment, of size `2^-level`, after `done` parts of that size.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Part {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Part {
     done: u64,
     level: u32,
+}
+
+/// An attempt: which stage, which increment of it, which part of that.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Attempt {
+    /// From 0.
+    pub stage: usize,
+    /// From 1.
+    pub increment: usize,
+    /// The part of the increment.
+    pub part: Part,
+    /// How often parts of the increment were halved before.
+    pub halvings: usize,
+}
+
+impl Attempt {
+    fn at(self, stages: &[Stage]) -> At {
+        let Self { stage, increment, part, halvings } = self;
+        let number = stages[..stage].iter().map(|stage| stage.increments).sum::<usize>() + increment;
+        let fraction = (increment as f64 - 1.0 + part.end()) / stages[stage].increments as f64;
+        At { stage, increment, number, fraction, halvings }
+    }
+
+    /// What follows on a success; `None` at the end of the history.
+    fn next(self, stages: &[Stage]) -> Option<Self> {
+        if let Some(part) = self.part.next() {
+            return Some(Self { part, ..self });
+        }
+        let whole = Self { part: Part::default(), halvings: 0, ..self };
+        if self.increment < stages[self.stage].increments {
+            return Some(Self { increment: self.increment + 1, ..whole });
+        }
+        let stage = self.stage + 1;
+        (stage < stages.len()).then_some(Self { stage, increment: 1, ..whole })
+    }
+}
+
+/// Where a history stands between two Newton steps: all that the rest of it depends on.
+pub struct Halt {
+    /// The attempt it is in.
+    pub attempt: Attempt,
+    /// What is committed.
+    pub committed: Committed,
+    /// The last solution, which is committed.
+    pub last: Option<Solution>,
+    /// Newton steps of the attempts before, with the number of the increment.
+    pub steps: Vec<(usize, StepRecord)>,
+    /// Where the attempt stands.
+    pub standing: Standing,
+}
+
+/// How a history begins.
+pub enum Entry {
+    /// From rest.
+    Rest,
+    /// Near the solution of the first increment.
+    Near(Start),
+    /// Where another one stood, whose conditions it shares.
+    At(Box<Halt>),
+}
+
+/// Who follows a history.
+pub struct Observer<'a> {
+    /// Told what happens on the way.
+    pub tell: &'a mut dyn FnMut(&TornProblem, Progress),
+    /// Asked between two Newton steps whether to stop there, and handed what it takes to go on. Collective.
+    pub pause: &'a dyn Fn(&dyn Fn() -> Halt) -> bool,
 }
 
 impl Part {
@@ -111,57 +181,71 @@ impl Part {
     }
 }
 
-/// Goes through the stages, first from `start` or from rest, until an increment cannot be reached. Collective.
+/// Goes through the stages until an increment cannot be reached, or it is stopped. Collective.
 ///
 /// `problem` is given with what is prescribed at the beginning, and left with what is at the last attempt.
 ///
 /// # Panics
-/// If there is no increment.
+/// If there is no stage.
 pub fn follow(
     problem: &mut TornProblem,
     solver: &mut StepSolver,
     settings: &Settings,
-    mut start: Option<Start>,
-    stages: Vec<Stage>,
+    entry: Entry,
+    stages: &[Stage],
     watch: &Watch,
-    tell: &mut dyn FnMut(&TornProblem, Progress),
+    Observer { tell, pause }: Observer,
 ) -> Followed {
-    let mut steps = Vec::new();
-    let mut from = Conditions { loads: std::mem::take(&mut problem.loads), rhs: std::mem::take(&mut problem.rhs) };
-    let (mut last, mut committed, mut number): (Option<Solution>, bool, usize) = (None, false, 0);
-    for (stage, Stage { end, increments, halvings }) in stages.into_iter().enumerate() {
-        for increment in 1..=increments {
-            number += 1;
-            let (mut part, mut halved) = (Some(Part::default()), 0);
-            while let Some(tried) = part {
-                if let Some(solution) = last.as_ref().filter(|_| !std::mem::replace(&mut committed, true)) {
-                    problem.commit(&solution.u, &solution.lambda);
-                }
-                let begin = last.as_ref().map(|solution| beginning(problem, solution)).or_else(|| start.take());
-                let fraction = (increment as f64 - 1.0 + tried.end()) / increments as f64;
-                let at = At { stage, increment, number, fraction, halvings: halved };
-                Conditions { loads: problem.loads, rhs: problem.rhs } = from.towards(&end, fraction);
-                tell(problem, Progress::Attempt(at));
-                let mut solution = solve(problem, solver, settings, begin, watch);
-                steps.extend(std::mem::take(&mut solution.steps).into_iter().map(|step| (number, step)));
-                if solution.outcome == Outcome::Converged {
-                    tell(problem, Progress::Solution(at, &solution));
-                    (last, committed) = (Some(solution), false);
-                    part = tried.next();
-                } else if let Some(half) = tried.halved(halvings) {
-                    tell(problem, Progress::Halved(at, &solution.outcome));
-                    solver.forget();
-                    (part, halved) = (Some(half), halved + 1);
-                } else {
-                    let failure = Some((at, solution.outcome.clone()));
-                    if last.is_none() {
-                        tell(problem, Progress::Solution(at, &solution));
-                    }
-                    return Followed { solution: last.unwrap_or(solution), steps, failure };
-                }
-            }
+    let (mut last, mut committed, mut steps): (Option<Solution>, bool, _) = (None, true, Vec::new());
+    let mut attempt = Attempt { stage: 0, increment: 1, part: Part::default(), halvings: 0 };
+    let mut begin = match entry {
+        Entry::Rest => Some(Begin::Rest),
+        Entry::Near(start) => Some(Begin::Near(start)),
+        Entry::At(halt) => {
+            (attempt, problem.committed, last, steps) = (halt.attempt, halt.committed, halt.last, halt.steps);
+            Some(Begin::At(Box::new(halt.standing)))
         }
-        from = end;
+    };
+    let start = Conditions { loads: std::mem::take(&mut problem.loads), rhs: std::mem::take(&mut problem.rhs) };
+    loop {
+        if let Some(solution) = last.as_ref().filter(|_| !std::mem::replace(&mut committed, true)) {
+            problem.commit(&solution.u, &solution.lambda);
+        }
+        let near = |solution: &Solution| Begin::Near(beginning(problem, solution));
+        let begin = begin.take().or_else(|| last.as_ref().map(near)).unwrap_or(Begin::Rest);
+        let at = attempt.at(stages);
+        let stage = &stages[attempt.stage];
+        let from = attempt.stage.checked_sub(1).map_or(&start, |before| &stages[before].end);
+        Conditions { loads: problem.loads, rhs: problem.rhs } = from.towards(&stage.end, at.fraction);
+        tell(problem, Progress::Attempt(at));
+        let halt = |standing: &dyn Fn() -> Standing| {
+            pause(&|| {
+                let (committed, last, steps) = (problem.committed.clone(), last.clone(), steps.clone());
+                Halt { attempt, committed, last, steps, standing: standing() }
+            })
+        };
+        let mut solution = solve(problem, solver, settings, begin, watch, &halt);
+        steps.extend(std::mem::take(&mut solution.steps).into_iter().map(|step| (at.number, step)));
+        if solution.outcome == Outcome::Converged {
+            tell(problem, Progress::Solution(at, &solution));
+            (last, committed) = (Some(solution), false);
+            match attempt.next(stages) {
+                Some(next) => attempt = next,
+                None => break,
+            }
+        } else if solution.outcome != Outcome::Stopped
+            && let Some(half) = attempt.part.halved(stage.halvings)
+        {
+            tell(problem, Progress::Halved(at, &solution.outcome));
+            solver.forget();
+            (attempt.part, attempt.halvings) = (half, attempt.halvings + 1);
+        } else {
+            let failure = Some((at, solution.outcome.clone()));
+            if last.is_none() && solution.outcome != Outcome::Stopped {
+                tell(problem, Progress::Solution(at, &solution));
+            }
+            return Followed { solution: last.unwrap_or(solution), steps, failure };
+        }
     }
     Followed { solution: last.expect("a history has an increment"), steps, failure: None }
 }

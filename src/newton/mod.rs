@@ -3,6 +3,7 @@
 //! `J` is convex and every iterate is made feasible, so the step of the quadratic model is a descent direction and the
 //! method, damped by `J`, converges from anywhere. [`step`] is the only place where FETI and the QP solvers meet.
 
+pub mod basis;
 pub mod certificate;
 pub mod committed;
 pub mod damping;
@@ -24,7 +25,9 @@ pub use errors::Errors;
 pub use problem::TornProblem;
 pub use program::{Method, ProgramSettings};
 pub use residuals::Residuals;
-pub use step::StepSolver;
+pub use step::{SolverState, StepSolver};
+
+use serde::{Deserialize, Serialize};
 
 use crate::feti::Torn;
 use crate::monitor::timing::Timer;
@@ -62,6 +65,8 @@ pub enum Outcome {
     Inner(qp::Outcome),
     /// A tangent stiffness is singular beyond its rigid motions.
     Singular(String),
+    /// Somebody asked to stop, and has what is needed to go on.
+    Stopped,
 }
 
 impl Outcome {
@@ -80,12 +85,13 @@ impl Outcome {
             }
             Self::Inner(outcome) => format!("a quadratic program could not be solved ({outcome:?})"),
             Self::Singular(message) => message.clone(),
+            Self::Stopped => "stopped on request".into(),
         })
     }
 }
 
 /// What one step did.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepRecord {
     /// Number, from 1.
     pub number: usize,
@@ -119,7 +125,33 @@ pub struct Start {
     pub held: Vec<bool>,
 }
 
+/// Where a solve stands between two steps: all that later steps depend on, beside the problem and what is committed.
+#[derive(Clone, Debug)]
+pub struct Standing {
+    /// Torn displacement.
+    pub u: Torn,
+    /// Multipliers of this rank's rows.
+    pub lambda: Vec<f64>,
+    /// How exactly the next quadratic program is solved.
+    pub forcing: Forcing,
+    /// What is kept from step to step.
+    pub solver: SolverState,
+    /// The steps so far.
+    pub steps: Vec<StepRecord>,
+}
+
+/// How a solve begins.
+pub enum Begin {
+    /// From rest.
+    Rest,
+    /// Near a solution.
+    Near(Start),
+    /// Where another one stood.
+    At(Box<Standing>),
+}
+
 /// The solution and what it took.
+#[derive(Clone, Debug)]
 pub struct Solution {
     /// Torn displacement; copies agree and the bodies do not overlap, to round-off.
     pub u: Torn,
@@ -155,28 +187,51 @@ pub struct Watch<'a> {
     pub step: &'a dyn Fn(&StepRecord),
 }
 
-/// Solves from rest or from `start`, one increment beyond what is committed. Collective.
+/// Solves one increment beyond what is committed. Between two steps `pause` is asked whether to stop there, and handed what
+/// it takes to go on. Collective, and so is `pause`.
 pub fn solve(
     problem: &TornProblem,
     solver: &mut StepSolver,
     settings: &Settings,
-    start: Option<Start>,
+    begin: Begin,
     &Watch { timer, alive, step: report }: &Watch,
+    pause: &dyn Fn(&dyn Fn() -> Standing) -> bool,
 ) -> Solution {
-    solver.begin();
-    let (mut u, held) = match start {
-        Some(Start { u, held }) => (u, Some(held)),
-        None => (problem.gather.zeros(), None),
-    };
+    let (mut u, mut lambda) = (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
+    let (mut steps, mut forcing, mut held, mut stood) = (Vec::new(), Forcing::default(), None, None);
+    match begin {
+        Begin::Rest => {}
+        Begin::Near(start) => (u, held) = (start.u, Some(start.held)),
+        Begin::At(at) => {
+            (u, lambda, forcing, steps) = (at.u, at.lambda, at.forcing, at.steps);
+            stood = Some(at.solver);
+        }
+    }
     let mut state = problem.evaluate(&u);
-    let mut lambda = held.map_or_else(|| vec![0.0; problem.gather.rows()], |held| solver.expect(problem, &state, held));
+    let mut refused = None;
+    if let Some(stood) = stood {
+        refused = solver.resume(problem, stood, &lambda, timer).err();
+    } else {
+        solver.begin();
+        if let Some(held) = held {
+            lambda = solver.expect(problem, &state, held);
+        }
+    }
     let mut residuals = problem.residuals(&u, &state, &lambda);
-    let mut steps = Vec::new();
-    let mut admissible = problem.is_admissible(&u);
-    let mut forcing = Forcing::default();
+    let mut admissible = !steps.is_empty() || problem.is_admissible(&u);
     let mut attempts: Vec<step::Step> = Vec::new();
     let (mut errors, mut ended_by_accuracy) = (None, false);
     let outcome = loop {
+        if let Some(message) = refused {
+            break Outcome::Singular(message);
+        }
+        let standing = || {
+            let (u, lambda, steps) = (u.clone(), lambda.clone(), steps.clone());
+            Standing { u, lambda, forcing, solver: solver.state(), steps }
+        };
+        if attempts.is_empty() && pause(&standing) {
+            break Outcome::Stopped;
+        }
         let watch = timer.total_seconds();
         if problem.is_linear() && settings.accuracy.is_none() {
             forcing.drop = solver.linear_drop();
@@ -254,7 +309,7 @@ pub fn solve(
             break Outcome::LimitReached;
         }
     };
-    if errors.is_none() && !steps.is_empty() && state.energy.is_finite() {
+    if errors.is_none() && !steps.is_empty() && state.energy.is_finite() && outcome != Outcome::Stopped {
         errors = Some(solver.errors(problem, (&u, &state), &lambda, timer));
     }
     Solution {

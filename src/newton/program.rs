@@ -59,6 +59,19 @@ pub struct Found {
     pub at_floor: bool,
 }
 
+/// What later programs depend on, but for the multipliers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ProgramState {
+    /// The rows that the last program's multipliers act on.
+    pub kept: Option<Vec<bool>>,
+    /// The largest first residual of a solve so far.
+    pub reference: Option<f64>,
+    /// Whether the next program is the first of a solve.
+    pub first: bool,
+    /// Norm of `F`, estimated for SMALSE-M.
+    pub norm: Option<f64>,
+}
+
 /// The solvers with what is kept from step to step.
 pub struct Programs {
     settings: ProgramSettings,
@@ -75,6 +88,21 @@ impl Programs {
     /// Nothing is known yet.
     pub fn new(settings: ProgramSettings) -> Self {
         Self { settings, last: None, reference: None, first: true, norm: None }
+    }
+
+    /// What the next programs depend on.
+    pub fn state(&self) -> ProgramState {
+        let kept = self.held().map(|face| face.kept().to_vec());
+        ProgramState { kept, reference: self.reference, first: self.first, norm: self.norm }
+    }
+
+    /// Goes on from such a state, with the multipliers that belong to it. Collective.
+    pub fn resume(&mut self, coarse: &Coarse, state: ProgramState, lambda: &[f64]) {
+        (self.reference, self.first, self.norm) = (state.reference, state.first, state.norm);
+        self.last = None;
+        if let Some(kept) = state.kept {
+            self.expect(coarse, lambda, kept);
+        }
     }
 
     /// Another solve follows.

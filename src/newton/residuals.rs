@@ -3,6 +3,8 @@
 //! With `v = f - F(u) - B_I'lambda_I` and the copies of each node added up, equilibrium asks that what is left at the
 //! unsupported components is zero. Nothing of the dual solver's recurrences is used.
 
+use serde::{Deserialize, Serialize};
+
 use super::committed::Sizes;
 use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::constraint::Kind;
@@ -10,7 +12,7 @@ use crate::feti::Torn;
 
 /// Relative residuals; all are zero for the exact solution. What they are relative to is not less than the largest such
 /// value of former increments.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Residuals {
     /// Euclidean norm of the unbalanced nodal forces over that of the applied or internal nodal forces (or a hundred
     /// millionth of the terms that these are sums of, where bodies move without strain).

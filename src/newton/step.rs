@@ -1,12 +1,14 @@
 //! One Newton step: tangents, factors, the dual quadratic program, and back to a displacement.
 
 use std::rc::Rc;
+use std::sync::Arc;
 
+use super::basis::{Bases, Basis};
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
 use super::motion;
 use super::problem::{State, TornProblem};
-use super::program::{Found, ProgramSettings, Programs};
+use super::program::{Found, ProgramSettings, ProgramState, Programs};
 use super::recover;
 use crate::assembly::stiffness;
 use crate::feti::Torn;
@@ -16,6 +18,7 @@ use crate::feti::operator::DualOperator;
 use crate::feti::preconditioner::Preconditioner;
 use crate::feti::projector::Projector;
 use crate::feti::scaling::Scaling;
+use crate::material::Material;
 use crate::monitor::timing::Timer;
 use crate::qp::{Outcome, Statistics};
 
@@ -42,6 +45,17 @@ pub struct Step {
     pub factorisations: usize,
 }
 
+/// What later steps depend on, but for the multipliers.
+#[derive(Clone, Debug)]
+pub struct SolverState {
+    /// Of the quadratic programs.
+    pub programs: ProgramState,
+    /// What new factors are stored in at least.
+    pub precision: Precision,
+    /// What the factors of each own subdomain are of.
+    pub bases: Vec<Bases>,
+}
+
 /// What is kept from step to step: factors, projector, multipliers.
 pub struct StepSolver<'a> {
     pub(super) operator: DualOperator<'a>,
@@ -52,10 +66,8 @@ pub struct StepSolver<'a> {
     twins: Vec<Option<usize>>,
     /// Lower values of each own subdomain's tangent, as it was factorised.
     tangents: Vec<Rc<Vec<f64>>>,
-    /// How many of its elements yield; none if there is no factor to go on with.
-    yielding: Vec<Option<usize>>,
-    /// By how much each tangent has changed since the preconditioner took it.
-    drift: Vec<f64>,
+    /// What its factors are of.
+    bases: Vec<Bases>,
     /// Scratch: a tangent that may be worth factorising.
     assembled: Vec<f64>,
 }
@@ -69,9 +81,100 @@ impl<'a> StepSolver<'a> {
         settings: ProgramSettings,
         twins: Vec<Option<usize>>,
     ) -> Self {
-        let (tangents, yielding) = (vec![Rc::default(); twins.len()], vec![None; twins.len()]);
-        let (programs, drift, assembled) = (Programs::new(settings), vec![0.0; twins.len()], Vec::new());
-        Self { operator, projector, preconditioner, programs, twins, tangents, yielding, drift, assembled }
+        let (tangents, bases) = (vec![Rc::default(); twins.len()], vec![Bases::default(); twins.len()]);
+        let (programs, assembled) = (Programs::new(settings), Vec::new());
+        Self { operator, projector, preconditioner, programs, twins, tangents, bases, assembled }
+    }
+
+    /// What the next steps depend on.
+    pub fn state(&self) -> SolverState {
+        let precision = self.operator.factors.precision();
+        SolverState { programs: self.programs.state(), precision, bases: self.bases.clone() }
+    }
+
+    /// Goes on from such a state, with the multipliers that belong to it: makes the factors again, to the same bits.
+    /// Collective.
+    ///
+    /// # Errors
+    /// A message, the same on every rank, if a tangent is singular.
+    pub fn resume(
+        &mut self,
+        problem: &TornProblem,
+        state: SolverState,
+        lambda: &[f64],
+        timer: &Timer,
+    ) -> Result<(), String> {
+        let SolverState { programs, precision, bases } = state;
+        self.programs.resume(&self.projector.coarse, programs, lambda);
+        self.operator.factors.set_precision(precision);
+        let mut failure = None;
+        for (own, bases) in bases.into_iter().enumerate() {
+            if failure.is_none() && bases.factor.is_some() {
+                failure = self.remake(problem, own, &bases, timer).err();
+            }
+            self.bases[own] = bases;
+        }
+        agree_on(failure, problem)
+    }
+
+    /// Makes the factors of a subdomain again.
+    fn remake(&mut self, problem: &TornProblem, own: usize, bases: &Bases, timer: &Timer) -> Result<(), NotDefinite> {
+        let subdomain = &problem.subdomains[own];
+        let twin = self.twins[own].is_some();
+        if bases.is_elastic()
+            && let Some(outcome) = self.adopt(own, subdomain.id, timer)
+        {
+            outcome?;
+        } else if let Some(basis) = &bases.factor {
+            let common = twin && bases.is_elastic();
+            self.tangents[own] = Rc::new(self.tangent(problem, own, basis));
+            let (factors, values) = (&mut self.operator.factors, &self.tangents[own]);
+            timer.time("factorisation", || factors.factorise(own, subdomain, values, common))?;
+        }
+        let (Some(basis), Some(_)) = (&bases.interior, &self.preconditioner) else { return Ok(()) };
+        if self.bases[own].interior.as_ref() == Some(basis) {
+            return Ok(());
+        }
+        let values = if bases.factor.as_ref() == Some(basis) {
+            Rc::clone(&self.tangents[own])
+        } else {
+            Rc::new(self.tangent(problem, own, basis))
+        };
+        let common = twin && *basis == Basis::Elastic;
+        self.take_interior(own, subdomain.id, &values, basis.clone(), common, timer)
+    }
+
+    /// Lower values of the tangent that a factor is of.
+    fn tangent(&self, problem: &TornProblem, own: usize, basis: &Basis) -> Vec<f64> {
+        let (subdomain, material) = (&problem.subdomains[own], &problem.materials[own]);
+        let pattern = &self.operator.factors.symbolic(own).pattern;
+        let mut values = vec![0.0; pattern.rows.len()];
+        match basis {
+            Basis::Elastic => {
+                let (material, rest) = (Material { yield_stress: None, ..*material }, vec![0.0; subdomain.dofs()]);
+                stiffness::assemble(subdomain, &material, &[], &rest, pattern, &mut values)
+            }
+            Basis::At(u) => {
+                stiffness::assemble(subdomain, material, problem.committed.history(own), u, pattern, &mut values)
+            }
+        };
+        values
+    }
+
+    /// Gives the preconditioner the interior block of these lower values, if there is one.
+    fn take_interior(
+        &mut self,
+        own: usize,
+        id: usize,
+        values: &[f64],
+        basis: Basis,
+        common: bool,
+        timer: &Timer,
+    ) -> Result<(), NotDefinite> {
+        let Some(Preconditioner { schur, .. }) = &mut self.preconditioner else { return Ok(()) };
+        (self.bases[own].interior, self.bases[own].drift) = (Some(basis), 0.0);
+        timer.count("factorisation of the interior", schur.flops(own), 0.0);
+        timer.time("factorisation of the interior", || schur.update(own, id, values, common))
     }
 
     /// Starts from the multipliers that a displacement and the rows that hold there suggest; returns them. They are
@@ -96,19 +199,25 @@ impl<'a> StepSolver<'a> {
     /// Forgets the multipliers and factors of a solve that failed.
     pub fn forget(&mut self) {
         self.programs.forget();
-        self.yielding.fill(None);
+        self.drop_factors();
     }
 
-    /// Another solve follows: its tolerances refer to its own first residual where that is larger than earlier ones.
+    fn drop_factors(&mut self) {
+        self.bases.iter_mut().for_each(|bases| bases.factor = None);
+    }
+
+    /// Another solve follows, from what is committed now: its tolerances refer to its own first residual where that is
+    /// larger than earlier ones.
     pub fn begin(&mut self) {
         self.programs.begin();
+        self.bases.iter_mut().for_each(Bases::commit);
     }
 
     /// From now on factorises in double precision; false if that was so before.
     pub fn sharpen(&mut self) -> bool {
         let before = self.operator.factors.precision();
         self.operator.factors.set_precision(Precision::Double);
-        self.yielding.fill(None);
+        self.drop_factors();
         before == Precision::Single
     }
 
@@ -195,21 +304,20 @@ impl<'a> StepSolver<'a> {
     /// Gives an elastic subdomain what an elastic twin has already; `None` if there is none.
     fn adopt(&mut self, own: usize, id: usize, timer: &Timer) -> Option<Result<(), NotDefinite>> {
         let class = self.twins[own]?;
-        let elastic = |k: &usize| self.twins[*k] == Some(class) && self.yielding[*k] == Some(0);
+        let elastic = |k: &usize| self.twins[*k] == Some(class) && self.bases[*k].is_elastic();
         let mut twins = (0..self.twins.len()).filter(elastic);
         let twin = twins.clone().next()?;
         let alike = self.preconditioner.as_ref().and_then(|p| twins.find(|&k| p.schur.alike(own, k)));
         self.operator.factors.share(own, twin);
         self.tangents[own] = Rc::clone(&self.tangents[twin]);
-        self.yielding[own] = Some(0);
-        self.drift[own] = 0.0;
-        let Some(Preconditioner { schur, .. }) = &mut self.preconditioner else { return Some(Ok(())) };
-        if let Some(alike) = alike {
+        self.bases[own].factor = Some(Basis::Elastic);
+        if let (Some(alike), Some(Preconditioner { schur, .. })) = (alike, &mut self.preconditioner) {
+            (self.bases[own].interior, self.bases[own].drift) = (Some(Basis::Elastic), 0.0);
             schur.share(own, alike);
             return Some(Ok(()));
         }
-        timer.count("factorisation of the interior", schur.flops(own), 0.0);
-        Some(timer.time("factorisation of the interior", || schur.update(own, id, &self.tangents[own], true)))
+        let values = Rc::clone(&self.tangents[own]);
+        Some(self.take_interior(own, id, &values, Basis::Elastic, true, timer))
     }
 
     /// Assembles the tangents at `u` and factorises those that changed by more than `left`; returns how many, over all
@@ -226,7 +334,7 @@ impl<'a> StepSolver<'a> {
         let mut factorised = Vec::with_capacity(u.len());
         for (own, subdomain) in problem.subdomains.iter().enumerate() {
             // An elastic tangent that was elastic before is the same matrix.
-            let unchanged = self.yielding[own] == Some(0) && state.yielding[own] == 0;
+            let unchanged = self.bases[own].is_elastic() && state.yielding[own] == 0;
             if unchanged || failure.is_some() {
                 factorised.push(0.0);
                 continue;
@@ -242,7 +350,7 @@ impl<'a> StepSolver<'a> {
             self.assembled.resize(pattern.rows.len(), 0.0);
             let assembled = &mut self.assembled;
             timer.time("assembly", || stiffness::assemble(subdomain, material, history, &u[own], pattern, assembled));
-            let known = self.yielding[own].is_some();
+            let known = self.bases[own].factor.is_some();
             let change = if known { pattern.difference(&self.tangents[own], assembled) } else { f64::INFINITY };
             // Where twins are elastic on other ranks only, it gets what it would get from one of them here.
             let common = elastic && self.twins[own].is_some();
@@ -251,33 +359,23 @@ impl<'a> StepSolver<'a> {
                 continue;
             }
             factorised.push(1.0);
-            self.drift[own] += change;
-            self.yielding[own] = Some(state.yielding[own]);
-            self.tangents[own] = Rc::new(assembled.clone());
-            let values = &self.tangents[own];
+            let basis = if elastic { Basis::Elastic } else { Basis::At(Arc::new(u[own].clone())) };
+            self.bases[own].drift += change;
+            self.bases[own].factor = Some(basis.clone());
+            let values = Rc::new(assembled.clone());
+            self.tangents[own] = Rc::clone(&values);
             let factors = &mut self.operator.factors;
-            let outcome = timer.time("factorisation", || factors.factorise(own, subdomain, values, common));
+            let outcome = timer.time("factorisation", || factors.factorise(own, subdomain, &values, common));
             timer.count("factorisation", factors.symbolic(own).analysis().flops(), 0.0);
-            let drift = &mut self.drift[own];
-            let outcome = outcome.and_then(|()| match &mut self.preconditioner {
-                Some(Preconditioner { schur, .. }) if common || drift.is_nan() || *drift > DRIFT => {
-                    *drift = 0.0;
-                    timer.count("factorisation of the interior", schur.flops(own), 0.0);
-                    let update = || schur.update(own, subdomain.id, values, common);
-                    timer.time("factorisation of the interior", update)
+            let drift = self.bases[own].drift;
+            failure = match outcome {
+                Ok(()) if common || drift.is_nan() || drift > DRIFT => {
+                    self.take_interior(own, subdomain.id, &values, basis, common, timer).err()
                 }
-                _ => Ok(()),
-            });
-            failure = outcome.err();
+                outcome => outcome.err(),
+            };
         }
-        // The lowest failing subdomain speaks; ranks that see no failure repeat its number.
-        let failed = failure.as_ref().map_or(f64::NEG_INFINITY, |f| -(f.subdomain as f64));
-        let lowest = problem.space.maximum(failed);
-        if lowest > f64::NEG_INFINITY {
-            let subdomain = -lowest as usize;
-            let unknown = NotDefinite { subdomain, pivot: 0, dofs: 0 };
-            return Err(failure.filter(|f| f.subdomain == subdomain).unwrap_or(unknown).to_string());
-        }
+        agree_on(failure, problem)?;
         if let Some(preconditioner) = &mut self.preconditioner {
             let diagonals: Vec<Vec<f64>> = self
                 .tangents
@@ -290,4 +388,16 @@ impl<'a> StepSolver<'a> {
         }
         Ok(problem.space.sum(&factorised, 1)[0] as usize)
     }
+}
+
+/// One outcome for all ranks: the lowest failing subdomain speaks; ranks that see no failure repeat its number.
+fn agree_on(failure: Option<NotDefinite>, problem: &TornProblem) -> Result<(), String> {
+    let failed = failure.as_ref().map_or(f64::NEG_INFINITY, |f| -(f.subdomain as f64));
+    let lowest = problem.space.maximum(failed);
+    if lowest == f64::NEG_INFINITY {
+        return Ok(());
+    }
+    let subdomain = -lowest as usize;
+    let unknown = NotDefinite { subdomain, pivot: 0, dofs: 0 };
+    Err(failure.filter(|f| f.subdomain == subdomain).unwrap_or(unknown).to_string())
 }

@@ -1,7 +1,10 @@
+use std::cell::{Cell, RefCell};
+use std::sync::Mutex;
+
 use crate::comm::threads;
 use crate::fixture::two_bricks;
 use crate::monitor::timing::Timer;
-use crate::results::piece::{Field, Values};
+use crate::results::piece::{Field, Piece, Values};
 use crate::results::summary::Summary;
 use crate::scene::Scene;
 use crate::study;
@@ -101,4 +104,84 @@ fn numbers_without_end_are_an_outcome() {
         assert_eq!(summary.converged, Some(false));
         assert!(summary.error.as_ref().is_some_and(|e| e.contains("not finite")), "{:?}", summary.error);
     }
+}
+
+/// All that a solve leaves: the summary without its times, and all fields, of all ranks.
+fn leave(scene: &Scene, ranks: usize, begin: impl Fn(usize) -> study::Begin + Sync, stop: usize) -> Left {
+    let parts = threads::run(ranks, |comm| {
+        let discrete = study::discretise(scene, comm).expect("the scene has a discrete problem");
+        let (asked, stood) = (Cell::new(0), RefCell::new(None));
+        let pause = |standing: &dyn Fn() -> study::Standing| {
+            asked.set(asked.get() + 1);
+            let stops = asked.get() == stop;
+            if stops {
+                *stood.borrow_mut() = Some(standing());
+            }
+            stops
+        };
+        let begin = begin(comm.rank());
+        let solved = study::solve_from(scene, &discrete, comm, begin, &Timer::start(), &mut |_| (), &pause);
+        (solved.ok().map(|solved| (solved.summary, solved.piece)), stood.into_inner())
+    });
+    let (solved, stood): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+    Left { solved: solved.into_iter().collect(), stood: stood.into_iter().collect() }
+}
+
+struct Left {
+    solved: Option<Vec<(Summary, Piece)>>,
+    stood: Option<Vec<study::Standing>>,
+}
+
+impl Left {
+    /// Everything that ought to be the same bits.
+    fn bits(self) -> String {
+        let parts = self.solved.expect("it was not stopped").into_iter().map(|(mut summary, piece)| {
+            summary.newton.iter_mut().for_each(|row| row.seconds = 0.0);
+            // Texts of numbers read back to the same bits.
+            format!("{summary:?} {piece:?}")
+        });
+        parts.collect()
+    }
+}
+
+/// Stops a solve before every one of its Newton steps in turn and goes on from there.
+#[track_caller]
+fn stopped_anywhere_it_arrives_at_the_same_bits(scene: &Scene, ranks: usize) -> usize {
+    let whole = leave(scene, ranks, |_| study::Begin::Rest, usize::MAX).bits();
+    for stop in 1.. {
+        let left = leave(scene, ranks, |_| study::Begin::Rest, stop);
+        let Some(stood) = left.stood else { return stop - 1 };
+        let stood: Vec<_> = stood.into_iter().map(|standing| Mutex::new(Some(Box::new(standing)))).collect();
+        let take = |rank: usize| stood[rank].lock().unwrap().take().expect("each rank takes its own, once");
+        let resumed = leave(scene, ranks, |rank| study::Begin::At(take(rank)), usize::MAX).bits();
+        assert!(resumed == whole, "stopped before step {stop}\n{resumed}\n{whole}");
+    }
+    unreachable!()
+}
+
+#[test]
+fn a_stopped_solve_goes_on_to_the_same_bits() {
+    for method in METHODS {
+        let steps = stopped_anywhere_it_arrives_at_the_same_bits(&plastic(&method), 2);
+        assert!(steps > 3, "{steps}");
+    }
+}
+
+#[test]
+fn a_stopped_history_goes_on_to_the_same_bits() {
+    let history = "step=[{increments=3}, {amplitude=-0.5, increments=2}]";
+    let twins = "decomposition.cells=[1, 1, 1]";
+    for set in [twins, "decomposition.cells=[2, 2, 2]"] {
+        let steps = stopped_anywhere_it_arrives_at_the_same_bits(&plastic(&[history, set]), 2);
+        assert!(steps > 10, "{steps}");
+    }
+}
+
+#[test]
+fn a_history_stopped_after_halvings_goes_on_to_the_same_bits() {
+    let history = ["step=[{}, {amplitude=-0.5}]", "solver.newton_limit=4"];
+    let scene = plastic(&history);
+    let whole = leave(&scene, 1, |_| study::Begin::Rest, usize::MAX).solved.expect("it was not stopped");
+    assert!(whole[0].0.steps.iter().any(|row| row.halvings > 0), "{:?}", whole[0].0.steps);
+    stopped_anywhere_it_arrives_at_the_same_bits(&scene, 1);
 }

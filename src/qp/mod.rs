@@ -27,6 +27,8 @@ mod dense;
 #[cfg(test)]
 mod torn;
 
+use serde::{Deserialize, Serialize};
+
 /// How a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -43,7 +45,7 @@ pub enum Outcome {
 }
 
 /// What a solver did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Statistics {
     /// Updates of the equality multiplier (SMALSE-M).
     pub outer: usize,

@@ -1,0 +1,38 @@
+//! What the kept factors were made of: little beside the factors themselves, and enough to make them again.
+
+use std::sync::Arc;
+
+/// The state whose tangent a factor is of.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Basis {
+    /// No element yields.
+    Elastic,
+    /// The subdomain had this displacement, one step from what is committed now.
+    At(Arc<Vec<f64>>),
+}
+
+/// The factors of a subdomain.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bases {
+    /// Of the whole tangent; `None` if there is no factor to go on with.
+    pub factor: Option<Basis>,
+    /// Of its interior block, for the preconditioner.
+    pub interior: Option<Basis>,
+    /// By how much the tangent has changed since the interior block was taken, relative to its diagonal.
+    pub drift: f64,
+}
+
+impl Bases {
+    /// Whether the factor is that of the elastic stiffness.
+    pub fn is_elastic(&self) -> bool {
+        self.factor == Some(Basis::Elastic)
+    }
+
+    /// What is made of displacements cannot be made again once their history has changed.
+    pub fn commit(&mut self) {
+        let is_plastic = |basis: &Option<Basis>| matches!(basis, Some(Basis::At(_)));
+        if is_plastic(&self.factor) || is_plastic(&self.interior) {
+            self.factor = None;
+        }
+    }
+}
