@@ -1,5 +1,6 @@
 //! The pipeline from a scene to results: the only file that sees every stage.
 
+pub mod checkpoint;
 mod conditions;
 mod contacts;
 mod discrete;

@@ -14,7 +14,7 @@ use std::mem::ManuallyDrop;
 use std::path::Path;
 
 use hdf5_metno::types::{FixedAscii, TypeDescriptor};
-use hdf5_metno::{Dataset, File, FileBuilder, H5Type, globals, h5check, sync::sync};
+use hdf5_metno::{Dataset, Datatype, File, FileBuilder, H5Type, globals, h5check, sync::sync};
 use hdf5_metno_sys::h5d::{H5Dread, H5Dwrite};
 use hdf5_metno_sys::h5i::hid_t;
 use hdf5_metno_sys::h5p::{H5FD_mpio_xfer_t, H5P_DEFAULT, H5Pclose, H5Pcreate, H5Pset_dxpl_mpio};
@@ -151,6 +151,53 @@ impl<'a> SharedFile<'a> {
         agree(self.comm, name, self.transfer(&dataset, 0, u64::from(!mine.is_empty()), mine))
     }
 
+    /// Number of rows of an array.
+    ///
+    /// # Errors
+    /// If there is none of that name.
+    pub fn count(&self, name: &str) -> Result<u64, String> {
+        let count = self.file.dataset(name).map(|dataset| dataset.shape().first().map_or(1, |&rows| rows as u64));
+        agree(self.comm, name, count)
+    }
+
+    /// Reads `count` rows of an array from `begin` on, other ones on each rank.
+    ///
+    /// # Errors
+    /// If there is no such array, it holds other numbers, or it is shorter.
+    pub fn read<T: Number>(&self, name: &str, begin: u64, count: u64) -> Result<Vec<T>, String> {
+        let read = || {
+            let dataset = self.file.dataset(name)?;
+            let shape = dataset.shape();
+            if !dataset.dtype()?.is::<T>() || shape.first().is_none_or(|&rows| begin + count > rows as u64) {
+                return Err(hdf5_metno::Error::from(format!("no rows {begin} to {} of such numbers", begin + count)));
+            }
+            let width = shape.get(1).copied().unwrap_or(1);
+            Ok((dataset, count as usize * width))
+        };
+        let (dataset, length) = agree(self.comm, name, read())?;
+        let mut bytes = vec![0; length * size_of::<T>()];
+        agree(self.comm, name, self.fetch(&dataset, begin, count, &mut bytes))?;
+        let numbers = bytes.chunks_exact(size_of::<T>());
+        // Safety: any bytes of its size are a number.
+        Ok(numbers.map(|number| unsafe { number.as_ptr().cast::<T>().read_unaligned() }).collect())
+    }
+
+    /// Reads a text, on every rank.
+    ///
+    /// # Errors
+    /// If there is none of that name.
+    pub fn read_text(&self, name: &str) -> Result<String, String> {
+        let open = || {
+            let dataset = self.file.dataset(name)?;
+            let length = dataset.dtype()?.size();
+            Ok::<_, hdf5_metno::Error>((dataset, length))
+        };
+        let (dataset, length) = agree(self.comm, name, open())?;
+        let mut bytes = vec![0; length];
+        agree(self.comm, name, self.fetch(&dataset, 0, 1, &mut bytes))?;
+        agree(self.comm, name, String::from_utf8(bytes))
+    }
+
     /// Closes the file; what HDF5 still held in memory is written now.
     ///
     /// # Errors
@@ -173,20 +220,43 @@ impl<'a> SharedFile<'a> {
 
     /// Moves this rank's `count` rows to the dataset's rows from `begin` on, or compares them with those.
     fn transfer(&self, dataset: &Dataset, begin: u64, count: u64, mine: &[u8]) -> hdf5_metno::Result<()> {
-        let kind = dataset.dtype()?;
-        let shape: Vec<u64> = dataset.shape().into_iter().map(|n| n as u64).collect();
-        let (here, there) = (Selection::rows(&shape, 0, count)?, Selection::rows(&shape, begin, count)?);
-        let properties = TransferProperties::new(self.comm.raw_mpi().is_some())?;
-        let (to, of, with) = (dataset.id(), kind.id(), properties.0);
-        // Safety: the buffers hold `count` rows of the dataset's own type, and the selections stay inside their extents.
         if self.task == Task::Write {
+            let Transfer { kind, here, there, properties } = self.prepare(dataset, begin, count)?;
+            let (to, of, with) = (dataset.id(), kind.id(), properties.0);
+            // Safety (here and in `fetch`): the buffers hold `count` rows of the dataset's own type, and the selections stay
+            // inside their extents.
             return sync(|| unsafe { h5check(H5Dwrite(to, of, here.0, there.0, with, mine.as_ptr().cast())) })
                 .map(drop);
         }
         let mut read = vec![0; mine.len()];
-        sync(|| unsafe { h5check(H5Dread(to, of, here.0, there.0, with, read.as_mut_ptr().cast())) })?;
+        self.fetch(dataset, begin, count, &mut read)?;
         if read == mine { Ok(()) } else { Err("reads back differently: is the disk full?".into()) }
     }
+
+    /// Moves the dataset's rows from `begin` on here.
+    fn fetch(&self, dataset: &Dataset, begin: u64, count: u64, mine: &mut [u8]) -> hdf5_metno::Result<()> {
+        let Transfer { kind, here, there, properties } = self.prepare(dataset, begin, count)?;
+        let (from, of, with) = (dataset.id(), kind.id(), properties.0);
+        sync(|| unsafe { h5check(H5Dread(from, of, here.0, there.0, with, mine.as_mut_ptr().cast())) }).map(drop)
+    }
+
+    fn prepare(&self, dataset: &Dataset, begin: u64, count: u64) -> hdf5_metno::Result<Transfer> {
+        let shape: Vec<u64> = dataset.shape().into_iter().map(|n| n as u64).collect();
+        Ok(Transfer {
+            kind: dataset.dtype()?,
+            here: Selection::rows(&shape, 0, count)?,
+            there: Selection::rows(&shape, begin, count)?,
+            properties: TransferProperties::new(self.comm.raw_mpi().is_some())?,
+        })
+    }
+}
+
+/// What a transfer needs: type of the numbers, rows in memory and in the file, and how.
+struct Transfer {
+    kind: Datatype,
+    here: Selection,
+    there: Selection,
+    properties: TransferProperties,
 }
 
 /// Through MPI-IO if the ranks are MPI processes.

@@ -1,16 +1,18 @@
 //! What a run leaves behind: the result file, the summary, and where both come from.
 //!
 //! [`vtkhdf`] writes the fields for ParaView, [`summary`] one JSON object for scripts, [`provenance`] the circumstances
-//! of the run. Every file is written under a temporary name and renamed when it is complete ([`replace`]), and a failure
+//! of the run, [`checkpoint`] what it takes to go on with it. Every file is written under a temporary name and renamed when it is complete ([`replace`]), and a failure
 //! on one rank is the same [`OutputError`] on all.
 //! It computes nothing: what is to be written comes in ready.
 
 pub mod agree;
+pub mod checkpoint;
 pub mod fields;
 pub mod hdf5;
 pub mod piece;
 pub mod provenance;
 pub mod replace;
+pub mod seal;
 pub mod summary;
 pub mod vtkhdf;
 

@@ -68,7 +68,8 @@ impl Field {
 }
 
 impl Values {
-    fn len(&self) -> usize {
+    /// How many.
+    pub(super) fn len(&self) -> usize {
         match self {
             Self::Real(values) => values.len(),
             Self::Integer(values) => values.len(),

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::OutputError;
 use super::agree::on_root;
@@ -94,7 +94,7 @@ pub struct CommunicationRow {
 
 /// What a solution is like. Energies are those of the last increment: what is stored elastically, and what this increment
 /// dissipates or stores by hardening.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Elements with plastic flow in the last increment.
     pub plastic_elements: Option<u64>,
@@ -143,7 +143,7 @@ pub struct Errors {
 }
 
 /// The end of an increment.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepRow {
     /// Number of the load step, from 1.
     pub step: u64,
@@ -220,7 +220,7 @@ pub struct Counters {
 }
 
 /// Relative residuals of the glued, undecomposed problem.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Residuals {
     /// Forces out of balance.
     #[serde(rename = "residual_equilibrium")]
@@ -237,7 +237,7 @@ pub struct Residuals {
 }
 
 /// What the solution on a coarser level took.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CascadeRow {
     /// Refinement level.
     pub level: usize,
