@@ -4,14 +4,19 @@
 //! all ranks end with the same code and one message.
 
 mod check;
+pub mod keeper;
+mod resume;
 mod solve;
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use self::check::{Check, check};
+use self::keeper::Signals;
+pub use self::resume::{Resume, resume};
 pub use self::solve::{Cascade, Solve, solve};
 use crate::bodies::MeshError;
 use crate::comm::{Comm, Shares, ordered_sum};
@@ -32,13 +37,16 @@ pub struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 converged; 1 finished without convergence, results written; 64 usage; \
-                          65 bad scene or mesh; 70 bug; 74 input or output failed.";
+                          65 bad scene or mesh; 70 bug; 74 input or output failed; 75 stopped by a signal or before \
+                          the time limit, `fetiplast resume` goes on.";
 
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Solve a scene and write its results.
     Solve(Solve),
+    /// Go on where a run stopped.
+    Resume(Resume),
     /// Report sizes and warnings of a scene; solves nothing.
     Check(Check),
     /// List the built-in scenes.
@@ -51,7 +59,7 @@ pub enum Command {
 }
 
 /// Which scene.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
 pub struct Source {
     /// A built-in scene (see `fetiplast scenes`) or a TOML file.
     #[arg(default_value = "two-blocks")]
@@ -85,6 +93,14 @@ pub enum Failure {
     /// Results cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// Somebody, or the clock, asked to stop.
+    #[error("{reason}; go on with: fetiplast resume {}", path.display())]
+    Stopped {
+        /// Who.
+        reason: String,
+        /// The checkpoint.
+        path: PathBuf,
+    },
 }
 
 impl Failure {
@@ -94,17 +110,20 @@ impl Failure {
             Self::Study(StudyError::Mesh(MeshError::Unreadable(_))) => 74,
             Self::Scene(_) | Self::Study(_) => 65,
             Self::Input(_) | Self::Place(_) | Self::Output(_) => 74,
+            Self::Stopped { .. } => 75,
         }
     }
 }
 
-/// Runs a command that needs communication; returns the exit code. Collective.
+/// Runs a command that needs communication; returns the exit code. What it solves stops when one of `signals` comes.
+/// Collective.
 ///
 /// # Errors
 /// If the scene is bad or files cannot be read or written: on every rank.
-pub fn run(command: Command, comm: &dyn Comm) -> Result<i32, Failure> {
+pub fn run(command: Command, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
     match command {
-        Command::Solve(arguments) => solve(arguments, comm),
+        Command::Solve(arguments) => solve(arguments, comm, signals),
+        Command::Resume(arguments) => resume(arguments, comm, signals),
         Command::Check(arguments) => check(&arguments, comm),
         Command::Scenes | Command::Show { .. } => Ok(0),
     }
@@ -119,7 +138,7 @@ impl Command {
                 let known = library::names().collect::<Vec<_>>().join(", ");
                 format!("there is no built-in scene `{name}`: known are {known}")
             })),
-            Self::Solve(_) | Self::Check(_) => None,
+            Self::Solve(_) | Self::Resume(_) | Self::Check(_) => None,
         }
     }
 

@@ -1,8 +1,10 @@
 //! `fetiplast`: see the crate's documentation and `fetiplast --help`.
 
+use std::io::Write;
 use std::process::exit;
 
 use clap::Parser;
+use fetiplast::cli::keeper::Signals;
 use fetiplast::cli::{Cli, Command, Failure, run};
 use fetiplast::comm::Comm;
 use fetiplast::comm::world::{EXIT_BUG, World};
@@ -35,6 +37,14 @@ fn main() {
             }
         });
     }
+    // Before MPI is up, so that a signal at any later moment finds the run prepared; a check may be ended at once.
+    let signals = match command {
+        Command::Solve(_) | Command::Resume(_) => Signals::catch().unwrap_or_else(|error| {
+            eprintln!("fetiplast: signals cannot be caught: {error}");
+            exit(EXIT_BUG)
+        }),
+        _ => Signals::default(),
+    };
     let Some(world) = World::start() else {
         eprintln!("fetiplast: MPI cannot be started");
         exit(EXIT_BUG);
@@ -43,11 +53,12 @@ fn main() {
         let format = tracing_subscriber::fmt::format().without_time().with_target(false).with_level(false).compact();
         tracing_subscriber::fmt().event_format(format).init();
     }
-    let outcome = run(command, &world);
+    let outcome = run(command, &world, signals);
     if let Err(failure) = &outcome
         && world.rank() == 0
     {
-        eprintln!("fetiplast: {failure}");
+        // In one piece, that the launcher's own words do not come between. A closed stream leaves nobody to tell.
+        let _ = std::io::stderr().write_all(format!("fetiplast: {failure}\n").as_bytes());
     }
     match outcome {
         // After a failed collective write HDF5 may not let go of its file: end without taking leave.

@@ -4,19 +4,24 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
 
-use super::{Failure, Source, describe_run, find, run_name, warnings};
+use super::keeper::{Checkpoints, Keeper, Signals};
+use super::resume::{labels, unfit};
+use super::{Failure, Found, Source, describe_run, find, run_name, warnings};
 use crate::comm::Comm;
 use crate::comm::metered::Metered;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
 use crate::monitor::timing::{Phase, PhaseTable, Timer};
+use crate::results::checkpoint::{self, Checkpoint};
 use crate::results::replace;
 use crate::results::summary::{CascadeRow, CommunicationRow, Summary};
 use crate::results::vtkhdf;
 use crate::scene::Scene;
-use crate::study::{self, StudyError};
+use crate::study::checkpoint::{Unfit, pack, unpack};
+use crate::study::{self, Begin, StudyError};
 
 /// Arguments of `solve`.
 #[derive(Debug, Args)]
@@ -41,6 +46,8 @@ pub struct Solve {
     /// Life signs inside a Newton step: auto, plain or off.
     #[arg(long, value_name = "MODE", default_value = "auto", value_parser = progress)]
     progress: Mode,
+    #[command(flatten)]
+    checkpoints: Checkpoints,
 }
 
 /// Tolerance of coarser levels: well below what halving the cells changes.
@@ -71,7 +78,7 @@ impl Cascade {
     }
 }
 
-fn progress(text: &str) -> Result<Mode, String> {
+pub(super) fn progress(text: &str) -> Result<Mode, String> {
     match text {
         "auto" => Ok(Mode::Auto),
         "plain" => Ok(Mode::Plain),
@@ -80,41 +87,93 @@ fn progress(text: &str) -> Result<Mode, String> {
     }
 }
 
+/// What a run has to do; a checkpoint says what is left.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Plan {
+    /// The scene by name or path, its level, what is changed in it, and where the summary goes.
+    #[serde(flatten)]
+    pub source: Source,
+    /// Levels to solve, coarsest first; the last is that of the scene.
+    pub levels: Vec<usize>,
+    /// What the subdomains of the first of them are expected to cost.
+    pub costs: Option<Vec<u64>>,
+    /// What the levels before took.
+    pub rows: Vec<CascadeRow>,
+}
+
+/// How and where a plan is carried out.
+pub(super) struct Conduct {
+    /// Runs since the program does.
+    pub timer: Timer,
+    pub out: PathBuf,
+    pub progress: Mode,
+    pub checkpoints: Checkpoints,
+    pub signals: Signals,
+}
+
 /// Solves a scene and writes its results. Collective.
 ///
 /// # Errors
 /// If the scene is bad or files cannot be read or written.
-pub fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
+pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
     let comm = &Metered::new(comm);
     let timer = Timer::start();
-    let mut monitor = Monitor::of_rank(comm.rank(), arguments.progress);
-    let Solve { source, out, qp, preconditioner, accuracy, cascade, .. } = arguments;
+    let Solve { mut source, out, qp, preconditioner, accuracy, cascade, progress, checkpoints } = arguments;
     let shorthand = |key: &str, value: Option<String>| value.map(|v| format!("solver.{key}={v}"));
-    let mut sets = source.sets.clone();
-    sets.extend(shorthand("qp", qp));
-    sets.extend(shorthand("preconditioner", preconditioner));
-    sets.extend(shorthand("accuracy", accuracy));
+    source.sets.extend(shorthand("qp", qp));
+    source.sets.extend(shorthand("preconditioner", preconditioner));
+    source.sets.extend(shorthand("accuracy", accuracy));
     let found = find(&source, comm)?;
-    let scene = found.at_level(source.level, &sets)?;
-    let result = out.join(format!("{}.vtkhdf", run_name(&source)));
-    let summary_file = source.summary.clone().unwrap_or_else(|| out.join(format!("{}.json", run_name(&source))));
+    let scene = found.at_level(source.level, &source.sets)?;
+    let mut levels = cascade.before(source.level, &scene);
+    levels.push(source.level);
+    let plan = Plan { source, levels, costs: None, rows: Vec::new() };
+    carry_out(plan, &found, &scene, None, Conduct { timer, out, progress, checkpoints, signals }, comm)
+}
+
+/// Solves level after level and writes results, from where a checkpoint of the first level stands if there is one. `found`
+/// is the scene of the plan, `scene` the same at its level. Collective.
+pub(super) fn carry_out(
+    mut plan: Plan,
+    found: &Found,
+    scene: &Scene,
+    mut checkpoint: Option<Checkpoint>,
+    conduct: Conduct,
+    comm: &Metered,
+) -> Result<i32, Failure> {
+    let Conduct { timer, out, progress, checkpoints, signals } = conduct;
+    let mut monitor = Monitor::of_rank(comm.rank(), progress);
+    let name = run_name(&plan.source);
+    let result = out.join(format!("{name}.vtkhdf"));
+    let summary_file = plan.source.summary.clone().unwrap_or_else(|| out.join(format!("{name}.json")));
     for file in [&result, &summary_file] {
         replace::probe(comm, file).map_err(Failure::Place)?;
     }
+    let keeper = Keeper::new(comm, &timer, checkpoints, signals, out.join(format!("{name}.checkpoint.h5")));
+    let run = Run { comm, timer: &timer, keeper: &keeper, scene: scene.to_toml() };
 
     let mut coarser: Option<(study::Discrete, study::Solved)> = None;
-    let mut rows = Vec::new();
-    for level in cascade.before(source.level, &scene) {
+    while let [level, _, ..] = plan.levels[..] {
         let watch = timer.total_seconds();
-        // A level that is too coarse for the scene is left out.
-        let Ok(mut scene) = found.at_level(level, &sets) else { continue };
-        for tolerance in [&mut scene.solver.newton_tolerance, &mut scene.solver.residual_tolerance] {
-            *tolerance = tolerance.max(ENOUGH_TO_START);
-        }
-        let solved = solve_level(&source, level, &scene, coarser.take(), comm, &timer, &mut monitor);
-        let Ok((discrete, solved)) = solved else { continue };
+        let solved = match found.at_level(level, &plan.source.sets) {
+            Ok(mut scene) => {
+                for tolerance in [&mut scene.solver.newton_tolerance, &mut scene.solver.residual_tolerance] {
+                    *tolerance = tolerance.max(ENOUGH_TO_START);
+                }
+                run.level(&mut plan, &scene, coarser.take(), checkpoint.take(), &mut monitor).map(Some)
+            }
+            Err(_) => Ok(None),
+        };
+        plan.levels.remove(0);
+        plan.costs = None;
+        let (discrete, solved) = match solved {
+            Ok(Some(solved)) => solved,
+            // A level that is too coarse for the scene is left out.
+            Ok(None) | Err(Failure::Study(_)) => continue,
+            Err(end) => return Err(end),
+        };
         let Summary { newton_iterations, counters, sizes, converged, .. } = &solved.summary;
-        rows.push(CascadeRow {
+        plan.rows.push(CascadeRow {
             level,
             subdomains: sizes.subdomains,
             newton_iterations: *newton_iterations,
@@ -124,16 +183,16 @@ pub fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
         });
         coarser = (*converged == Some(true)).then_some((discrete, solved));
     }
-    let (discrete, mut solved) = solve_level(&source, source.level, &scene, coarser, comm, &timer, &mut monitor)?;
+    let (discrete, mut solved) = run.level(&mut plan, scene, coarser, checkpoint, &mut monitor)?;
     timer.time("output", || vtkhdf::write(comm, &result, &solved.piece, &solved.records))?;
 
     let table = PhaseTable::gather(comm, &timer, comm.traffic());
     let summary = &mut solved.summary;
-    describe_run(summary, &source, comm);
-    summary.warnings = warnings(&scene, &discrete, comm);
+    describe_run(summary, &plan.source, comm);
+    summary.warnings = warnings(scene, &discrete, comm);
     summary.mesh_reading_mb = discrete.reading_mb;
     summary.provenance = solved.records.provenance.into_iter().filter(|(name, _)| name != "scene").collect();
-    summary.cascade = rows;
+    summary.cascade = plan.rows;
     summary.time = table.max_seconds();
     summary.work = table.work();
     summary.communication = communication(&table);
@@ -153,31 +212,65 @@ pub fn solve(arguments: Solve, comm: &dyn Comm) -> Result<i32, Failure> {
     Ok(i32::from(!converged))
 }
 
-/// Discretises and solves one level, from the solution of a coarser one if there is one. Collective.
-fn solve_level(
-    source: &Source,
-    level: usize,
-    scene: &Scene,
-    coarser: Option<(study::Discrete, study::Solved)>,
-    comm: &dyn Comm,
-    timer: &Timer,
-    monitor: &mut Monitor,
-) -> Result<(study::Discrete, study::Solved), StudyError> {
-    let costs = coarser.as_ref().and_then(|(coarse, solved)| {
-        timer.time("interpolation", || study::expected_costs(comm, (coarse, solved), scene))
-    });
-    let discrete = timer.time("discretisation", || study::discretise_by_cost(scene, costs.as_deref(), comm))?;
-    let sizes = study::sizes(&discrete, comm);
-    monitor.event(&Event::Sizes { scene: source.scene.clone(), level, ranks: comm.size(), sizes });
-    discrete.contact_rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
-    discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
-    if level == source.level {
-        warnings(scene, &discrete, comm).into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
+/// What all levels of a run share.
+struct Run<'a> {
+    comm: &'a Metered<'a>,
+    timer: &'a Timer,
+    keeper: &'a Keeper<'a>,
+    /// The scene at its level.
+    scene: String,
+}
+
+impl Run<'_> {
+    /// Discretises and solves the first level of a plan, from a checkpoint or the solution of a coarser level if there is
+    /// one. Collective.
+    fn level(
+        &self,
+        plan: &mut Plan,
+        scene: &Scene,
+        coarser: Option<(study::Discrete, study::Solved)>,
+        checkpoint: Option<Checkpoint>,
+        monitor: &mut Monitor,
+    ) -> Result<(study::Discrete, study::Solved), Failure> {
+        let Self { comm, timer, keeper, .. } = *self;
+        if let Some((coarse, solved)) = &coarser {
+            plan.costs = timer.time("interpolation", || study::expected_costs(comm, (coarse, solved), scene));
+        }
+        let costs = plan.costs.as_deref();
+        let discrete = timer.time("discretisation", || study::discretise_by_cost(scene, costs, comm))?;
+        let sizes = study::sizes(&discrete, comm);
+        let (name, level) = (plan.source.scene.clone(), plan.levels[0]);
+        monitor.event(&Event::Sizes { scene: name, level, ranks: comm.size(), sizes });
+        discrete.contact_rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
+        discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
+        if let [_] = plan.levels[..] {
+            warnings(scene, &discrete, comm).into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
+        }
+        let refined = coarser
+            .map(|(coarse, solved)| timer.time("interpolation", || study::refine(comm, (&coarse, &solved), &discrete)));
+        let mut begin = refined.map_or(Begin::Rest, Begin::Near);
+        if let Some(file) = checkpoint {
+            let standing = timer.time("checkpoints", || unpack(comm, &discrete, &file));
+            let standing = standing.and_then(|standing| file.close().map(|()| standing).map_err(Unfit::from));
+            begin = Begin::At(Box::new(standing.map_err(unfit)?));
+        }
+        let pause = |standing: &dyn Fn() -> study::Standing| {
+            keeper.pause(|path| {
+                let (mut texts, arrays) = pack(comm, &discrete, standing());
+                texts.extend(labels(plan, &self.scene));
+                checkpoint::write(comm, path, &texts, &arrays)
+            })
+        };
+        let solved =
+            study::solve_from(scene, &discrete, comm, begin, timer, &mut |event| monitor.event(&event), &pause);
+        match (solved, keeper.end()) {
+            (Err(StudyError::Stopped), Some(Ok(reason))) => {
+                Err(Failure::Stopped { reason, path: keeper.path().to_owned() })
+            }
+            (Err(StudyError::Stopped), Some(Err(error))) => Err(Failure::Output(error)),
+            (solved, _) => Ok((discrete, solved?)),
+        }
     }
-    let start = coarser
-        .map(|(coarse, solved)| timer.time("interpolation", || study::refine(comm, (&coarse, &solved), &discrete)));
-    let solved = study::solve(scene, &discrete, comm, start, timer, &mut |event| monitor.event(&event))?;
-    Ok((discrete, solved))
 }
 
 /// Messages as rows of the summary.

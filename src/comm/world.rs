@@ -43,8 +43,9 @@ impl World {
         std::process::exit(code)
     }
 
-    /// Ends every rank at once with an exit code.
+    /// Waits for the other ranks and ends all of them at once with an exit code, without shutting MPI down.
     pub fn abort(&self, code: i32) -> ! {
+        self.world.barrier();
         self.world.abort(code)
     }
 }

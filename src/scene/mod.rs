@@ -7,6 +7,7 @@
 //! Not here: meshes, geometry beyond counting cells, numerics. This room imports no other.
 
 mod body;
+mod changes;
 mod check;
 mod contact;
 mod decomposition;
@@ -27,6 +28,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 pub use body::{Axis, Body, Brick, Element, Gmsh, Rotation, Shape};
+pub use changes::changes;
 pub use contact::{Contact, Obstacle, Sides};
 pub use decomposition::{Decomposition, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};

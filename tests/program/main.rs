@@ -5,6 +5,7 @@ mod bad_input;
 mod bad_mesh;
 mod benchmark;
 mod cascade;
+mod checkpoint;
 mod common;
 mod elements;
 mod fuzz;

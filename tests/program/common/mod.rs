@@ -112,6 +112,66 @@ pub fn scene_file(directory: &Path, text: &str) -> String {
     path.to_str().unwrap().to_owned()
 }
 
+/// How a run ended and what it said.
+pub struct End {
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+    pub seconds: f64,
+}
+
+/// Runs the program with these arguments, which say where its files go. `disturb` is told the process that was started
+/// (mpirun's, for more than one rank) and may do it harm.
+pub fn run_disturbed(ranks: usize, arguments: &[&str], disturb: impl FnOnce(u32)) -> End {
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let directory = tempfile::tempdir().unwrap();
+    let (command, streams) = prepare(ranks, arguments, directory.path());
+    end(command, streams, disturb)
+}
+
+fn end(command: Command, streams: [PathBuf; 2], disturb: impl FnOnce(u32)) -> End {
+    let start = Instant::now();
+    let status = wait(command, disturb);
+    let [stdout, stderr] = streams.map(|path| fs::read_to_string(path).unwrap());
+    let signal = std::os::unix::process::ExitStatusExt::signal(&status);
+    let code = status.code().or(signal.map(|signal| 128 + signal)).unwrap();
+    End { code, stdout, stderr, seconds: start.elapsed().as_secs_f64() }
+}
+
+/// Runs the program in a directory that takes so much (a file system of its own, which nobody else sees).
+pub fn run_in_small_room(ranks: usize, arguments: &[&str], directory: &Path, size: &str) -> End {
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let outside = tempfile::tempdir().unwrap();
+    let (program, streams) = prepare(ranks, arguments, outside.path());
+    let mut command = Command::new("unshare");
+    let mount = format!("mount -t tmpfs -o size={size} none {} && exec \"$@\"", directory.display());
+    command.args(["--mount", "--map-root-user", "sh", "-c", &mount, "sh"]).arg(program.get_program());
+    command.args(program.get_args());
+    command.envs(program.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    command.stdout(File::create(&streams[0]).unwrap()).stderr(File::create(&streams[1]).unwrap());
+    end(command, streams, |_| ())
+}
+
+/// Processes that a process has started.
+pub fn children(process: u32) -> Vec<u32> {
+    let text = fs::read_to_string(format!("/proc/{process}/task/{process}/children")).unwrap_or_default();
+    text.split_whitespace().map(|child| child.parse().unwrap()).collect()
+}
+
+/// Waits until a file is there, not for ever.
+pub fn wait_for(file: &Path) {
+    let start = Instant::now();
+    while !file.exists() && start.elapsed() < TIME_LIMIT {
+        sleep(Duration::from_millis(5));
+    }
+}
+
+/// Sends a signal to a process.
+pub fn send(signal: &str, process: u32) {
+    // It may be gone already.
+    Command::new("kill").args([&format!("-{signal}"), &process.to_string()]).output().unwrap();
+}
+
 /// One of these runs at a time: others would take the cores that it counts on.
 fn launch(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
     // A failed test poisons the lock, which guards no data.
@@ -120,6 +180,15 @@ fn launch(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
 }
 
 fn launch_beside_others(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
+    let (command, streams) = prepare(ranks, arguments, directory.path());
+    let status = wait(command, |_| ());
+    let [stdout, stderr] = streams.map(|path| fs::read_to_string(path).unwrap());
+    let code = status.code().unwrap_or_else(|| panic!("{status}: {stderr}"));
+    Run { code, stdout, stderr, directory }
+}
+
+/// The command, and the files that its output goes to.
+fn prepare(ranks: usize, arguments: &[&str], directory: &Path) -> (Command, [PathBuf; 2]) {
     let program = env!("CARGO_BIN_EXE_fetiplast");
     let mut command = if ranks == 1 { Command::new(program) } else { Command::new("mpirun") };
     if ranks > 1 {
@@ -132,18 +201,16 @@ fn launch_beside_others(ranks: usize, arguments: &[&str], directory: TempDir) ->
         command.env("OMPI_MCA_mpi_yield_when_idle", "1");
     }
     // Files, unlike pipes, never fill up.
-    let streams = ["stdout", "stderr"].map(|name| directory.path().join(name));
+    let streams = ["stdout", "stderr"].map(|name| directory.join(name));
     command.stdout(File::create(&streams[0]).unwrap()).stderr(File::create(&streams[1]).unwrap());
-    let status = wait(command);
-    let [stdout, stderr] = streams.map(|path| fs::read_to_string(path).unwrap());
-    let code = status.code().unwrap_or_else(|| panic!("{status}: {stderr}"));
-    Run { code, stdout, stderr, directory }
+    (command, streams)
 }
 
 /// The end of a command, which is killed and a failure of the test if it does not come in time.
-fn wait(mut command: Command) -> ExitStatus {
+fn wait(mut command: Command, disturb: impl FnOnce(u32)) -> ExitStatus {
     let mut child = command.spawn().expect("the program can be started");
     let start = Instant::now();
+    disturb(child.id());
     loop {
         if let Some(status) = child.try_wait().unwrap() {
             return status;

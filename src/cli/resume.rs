@@ -1,0 +1,119 @@
+//! `fetiplast resume`: goes on where a checkpoint stands.
+//!
+//! The scene is read again, from where it was, and has to be the same: a checkpoint knows what was solved, not what for.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::keeper::{Checkpoints, Signals};
+use super::solve::{Conduct, Plan, carry_out, progress};
+use super::{Failure, find};
+use crate::comm::Comm;
+use crate::comm::metered::Metered;
+use crate::monitor::Monitor;
+use crate::monitor::events::{Event, Sink};
+use crate::monitor::progress::Mode;
+use crate::monitor::timing::Timer;
+use crate::results::checkpoint::{self, Checkpoint};
+use crate::results::provenance::{COMMIT, VERSION};
+use crate::scene;
+use crate::study::checkpoint::Unfit;
+
+/// Arguments of `resume`.
+#[derive(Debug, Args)]
+pub struct Resume {
+    /// The checkpoint, OUT/SCENE.checkpoint.h5. If it is damaged the one before is taken.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Where results go, if not beside the checkpoint.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Where the summary goes, if not to where it was to go.
+    #[arg(long, value_name = "FILE")]
+    summary: Option<PathBuf>,
+    /// Life signs inside a Newton step: auto, plain or off.
+    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = progress)]
+    progress: Mode,
+    #[command(flatten)]
+    checkpoints: Checkpoints,
+}
+
+/// What a checkpoint is written by; others are not understood.
+const FORMAT: &str = "fetiplast checkpoint 1";
+
+/// What a checkpoint says of its run.
+pub(super) fn labels(plan: &Plan, scene: &str) -> [(&'static str, String); 4] {
+    let plan = serde_json::to_string(plan).expect("a plan can be written as JSON");
+    let program = format!("{VERSION} ({COMMIT})");
+    [("run/format", FORMAT.into()), ("run/program", program), ("run/plan", plan), ("run/scene", scene.into())]
+}
+
+/// Goes on with a run. Collective.
+///
+/// # Errors
+/// If the scene has changed, the checkpoint is of no use, or files cannot be read or written.
+pub fn resume(arguments: Resume, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
+    let comm = &Metered::new(comm);
+    let timer = Timer::start();
+    let Resume { file, out, summary, progress, checkpoints } = arguments;
+    let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
+    let (path, checkpoint) = open(comm, &file, &mut monitor)?;
+    let unreadable = |reason: String| Failure::Input(format!("cannot go on from {}: {reason}", path.display()));
+    let text = |name: &str| checkpoint.text(name).map_err(unreadable);
+    if text("run/format")? != FORMAT {
+        return Err(unreadable(format!("it is no `{FORMAT}`, but of another version of this program")));
+    }
+    let (program, now) = (text("run/program")?, format!("{VERSION} ({COMMIT})"));
+    if program != now {
+        monitor.event(&Event::Warning(format!(
+            "the checkpoint was written by fetiplast {program}, this is {now}: the last digits may differ"
+        )));
+    }
+    let mut plan: Plan = serde_json::from_str(&text("run/plan")?)
+        .map_err(|error| unreadable(format!("its plan is not understood: {error}")))?;
+    let found = find(&plan.source, comm)?;
+    let scene = found.at_level(plan.source.level, &plan.source.sets)?;
+    let changes = scene::changes(&text("run/scene")?, &scene.to_toml());
+    if !changes.is_empty() {
+        return Err(Failure::Scene(format!(
+            "the scene has changed since the checkpoint was written: {}; undo that, or solve it from the beginning",
+            changes.join(", ")
+        )));
+    }
+    plan.source.summary = summary.or(plan.source.summary);
+    let out = out.unwrap_or_else(|| file.parent().map(Path::to_owned).unwrap_or_default());
+    carry_out(plan, &found, &scene, Some(checkpoint), Conduct { timer, out, progress, checkpoints, signals }, comm)
+}
+
+/// Opens a checkpoint, or the one before.
+fn open<'a>(comm: &'a dyn Comm, file: &Path, monitor: &mut Monitor) -> Result<(PathBuf, Checkpoint<'a>), Failure> {
+    let reason = match Checkpoint::open(comm, file) {
+        Ok(checkpoint) => return Ok((file.to_owned(), checkpoint)),
+        Err(reason) => reason,
+    };
+    let before = checkpoint::previous(file);
+    match Checkpoint::open(comm, &before) {
+        Ok(checkpoint) => {
+            monitor.event(&Event::Warning(format!(
+                "cannot go on from {}: {reason}; going on from the one before, {}",
+                file.display(),
+                before.display()
+            )));
+            Ok((before, checkpoint))
+        }
+        Err(_) => Err(Failure::Input(format!(
+            "cannot go on from {}: {reason}; nor is there a usable one before it, {}",
+            file.display(),
+            before.display()
+        ))),
+    }
+}
+
+/// Why a checkpoint is of no use for the scene.
+pub(super) fn unfit(unfit: Unfit) -> Failure {
+    match unfit {
+        Unfit::Mesh | Unfit::Subdomains => Failure::Scene(unfit.to_string()),
+        Unfit::Unreadable(reason) => Failure::Input(format!("the checkpoint cannot be read: {reason}")),
+    }
+}

@@ -1,0 +1,233 @@
+//! A run that is stopped goes on where it stood, on any number of ranks, and arrives at the same bits.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::Duration;
+
+use crate::common::fields::Fields;
+use crate::common::{End, children, run_disturbed, send, wait_for};
+use serde_json::{Map, Value};
+
+/// Plastic flow, and contact that opens again.
+const HISTORY: &str = "step=[{increments=2}, {amplitude=0.2}]";
+/// The benchmark with cells twice as large.
+const COARSE: [&str; 3] =
+    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
+
+/// A command line that solves two blocks, results in `out`.
+fn solve<'a>(out: &'a Path, sets: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
+    let mut arguments = vec!["solve", "two-blocks", "--progress", "off", "--out", out.to_str().unwrap()];
+    arguments.extend(sets.iter().flat_map(|set| ["--set", *set]));
+    arguments.extend(more);
+    arguments
+}
+
+fn resume(ranks: usize, file: &Path) -> End {
+    run_disturbed(ranks, &["resume", file.to_str().unwrap(), "--progress", "off"], |_| ())
+}
+
+fn checkpoint(out: &Path) -> PathBuf {
+    out.join("two-blocks.checkpoint.h5")
+}
+
+/// Keys of the summary that belong to the run, not to its result.
+const OF_THE_RUN: [&str; 8] =
+    ["ranks", "time", "work", "communication", "time_total", "peak_rss_mb", "mesh_reading_mb", "provenance"];
+
+/// Fields by name.
+type Bits = Vec<(String, Vec<u64>)>;
+
+/// The summary but for what belongs to the run, and the bits of all fields.
+fn result(out: &Path, name: &str) -> (Map<String, Value>, Bits) {
+    let text = fs::read_to_string(out.join(format!("{name}.json"))).unwrap();
+    let Value::Object(mut summary) = serde_json::from_str(&text).unwrap() else { panic!("the summary is an object") };
+    OF_THE_RUN.iter().for_each(|key| assert!(summary.remove(*key).is_some(), "no key {key}"));
+    for list in ["newton", "cascade"] {
+        for row in summary[list].as_array_mut().unwrap() {
+            assert!(row.as_object_mut().unwrap().remove("seconds").is_some());
+        }
+    }
+    let file = out.join(format!("{name}.vtkhdf"));
+    let fields = Fields::at(&file, 0);
+    let mut bits = fields.bits(&["VTKHDF/PointData", "VTKHDF/CellData", "convergence"]);
+    bits.retain(|(name, _)| name != "VTKHDF/CellData/rank");
+    assert!(bits.len() > 10 && bits.iter().all(|(_, column)| !column.is_empty()), "no fields");
+    bits.sort();
+    (summary, bits)
+}
+
+#[track_caller]
+fn assert_same_result(out: &Path, whole: &Path, name: &str) {
+    let ((summary, bits), (summary_1, bits_1)) = (result(out, name), result(whole, name));
+    for (key, value) in &summary_1 {
+        assert_eq!(summary[key], *value, "{key}");
+    }
+    for ((name, column), (name_1, column_1)) in bits.iter().zip(&bits_1) {
+        assert!(name == name_1 && column == column_1, "{name} differs");
+    }
+    assert_eq!((summary.len(), bits.len()), (summary_1.len(), bits_1.len()));
+}
+
+/// Exit code where SIGUSR1 meets a process that has not got as far as to catch it.
+const BEFORE_IT_BEGAN: i32 = 128 + 10;
+
+/// Stops a run after `delays`, each time going on with another number of ranks, until it ends; returns how often it
+/// was stopped.
+fn stop_and_go_on(out: &Path, arguments: &[&str], signal: &str, delays: &[Duration]) -> usize {
+    let file = checkpoint(out);
+    let (mut command, mut stopped) = (arguments.to_vec(), 0);
+    for (start, &delay) in delays.iter().enumerate() {
+        let end = run_disturbed(1 + start % 3, &command, |process| {
+            sleep(delay);
+            send(signal, process);
+        });
+        if end.code == 0 {
+            return stopped;
+        }
+        assert!(end.seconds < 60.0);
+        if end.code == BEFORE_IT_BEGAN {
+            // To be started again as it was.
+            continue;
+        }
+        assert_eq!(end.code, 75, "{}{}", end.stdout, end.stderr);
+        assert_eq!(end.stderr.matches("stopped by SIG").count(), 1, "{}", end.stderr);
+        stopped += 1;
+        command = vec!["resume", file.to_str().unwrap(), "--progress", "off"];
+    }
+    let end = run_disturbed(2, &command, |_| ());
+    assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+    stopped
+}
+
+/// Moments of a run, none like the other, from a seed (Knuth's linear congruences).
+fn moments(seed: u64, count: usize, longest: Duration) -> Vec<Duration> {
+    let next = |x: &u64| Some(x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407));
+    let shares = std::iter::successors(Some(seed), next).skip(1).map(|x| (x >> 11) as f64 / (1_u64 << 53) as f64);
+    shares.take(count).map(|share| longest.mul_f64(share)).collect()
+}
+
+/// How many moments are tried; `scripts/faults` asks for more.
+fn tries() -> usize {
+    std::env::var("FETIPLAST_TRIES").ok().map_or(3, |tries| tries.parse().expect("a number of tries"))
+}
+
+#[test]
+fn a_run_stopped_at_any_moment_arrives_at_the_same_bits_on_other_ranks() {
+    let sets = [&COARSE[..], &[HISTORY]].concat();
+    let whole = tempfile::tempdir().unwrap();
+    let end = run_disturbed(2, &solve(whole.path(), &sets, &[]), |_| ());
+    assert_eq!(end.code, 0, "{}", end.stderr);
+    let longest = Duration::from_secs_f64(end.seconds);
+    let mut stopped = 0;
+    for (seed, moment) in moments(6, tries(), longest).into_iter().enumerate() {
+        let out = tempfile::tempdir().unwrap();
+        let delays = [&[moment], &moments(seed as u64, 2, longest)[..]].concat();
+        stopped += stop_and_go_on(out.path(), &solve(out.path(), &sets, &[]), "USR1", &delays);
+        assert_same_result(out.path(), whole.path(), "two-blocks");
+    }
+    assert!(stopped > 0, "no moment was early enough");
+}
+
+#[test]
+fn a_cascade_stopped_by_the_clock_goes_on_to_the_same_bits() {
+    let whole = tempfile::tempdir().unwrap();
+    let level = ["--level", "2", "--cascade", "on"];
+    assert_eq!(run_disturbed(2, &solve(whole.path(), &COARSE, &level), |_| ()).code, 0);
+    let out = tempfile::tempdir().unwrap();
+    let file = out.path().join("two-blocks-level2.checkpoint.h5");
+    let limit = [&level[..], &["--time-limit", "0.001"]].concat();
+    let mut end = run_disturbed(1, &solve(out.path(), &COARSE, &limit), |_| ());
+    // The clock stops it before its first step; later it may take one checkpoint's time after the other.
+    assert_eq!(end.code, 75, "{}{}", end.stdout, end.stderr);
+    assert!(end.stderr.contains("stopped before the time limit; go on with: fetiplast resume"), "{}", end.stderr);
+    for limit in ["0.1", "0.5", "1", "2"] {
+        let arguments = ["resume", file.to_str().unwrap(), "--time-limit", limit];
+        end = run_disturbed(2, &arguments, |_| ());
+        if end.code == 0 {
+            break;
+        }
+        assert_eq!(end.code, 75, "{}{}", end.stdout, end.stderr);
+    }
+    if end.code != 0 {
+        end = resume(3, &file);
+    }
+    assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+    assert_same_result(out.path(), whole.path(), "two-blocks-level2");
+}
+
+#[test]
+fn a_signal_to_the_ranks_themselves_stops_the_run_as_one_by_mpirun() {
+    let out = tempfile::tempdir().unwrap();
+    let more = ["--qp", "smalse-m", "--preconditioner", "none", "--checkpoint-every", "0.000001"];
+    let end = run_disturbed(2, &solve(out.path(), &[], &more), |launcher| {
+        // The first checkpoint says that the run is under way.
+        wait_for(&checkpoint(out.path()));
+        children(launcher).into_iter().for_each(|rank| send("TERM", rank));
+    });
+    assert_eq!(end.code, 75, "{}{}", end.stdout, end.stderr);
+    assert_eq!(end.stderr.matches("stopped by SIGTERM; go on with: fetiplast resume").count(), 1, "{}", end.stderr);
+}
+
+/// A directory with two checkpoints of a small run, the later one taken in the middle.
+fn two_checkpoints() -> tempfile::TempDir {
+    let out = tempfile::tempdir().unwrap();
+    let end = run_disturbed(2, &solve(out.path(), &COARSE, &["--checkpoint-every", "0.000001"]), |_| ());
+    assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+    assert!(checkpoint(out.path()).exists() && before(out.path()).exists());
+    out
+}
+
+fn before(out: &Path) -> PathBuf {
+    out.join("two-blocks.checkpoint.h5.previous")
+}
+
+#[test]
+fn a_damaged_checkpoint_is_noticed_and_the_one_before_is_taken() {
+    let out = two_checkpoints();
+    let whole = tempfile::tempdir().unwrap();
+    for name in ["two-blocks.vtkhdf", "two-blocks.json"] {
+        fs::rename(out.path().join(name), whole.path().join(name)).unwrap();
+    }
+    let file = checkpoint(out.path());
+    let sound = fs::read(&file).unwrap();
+    let mut flipped = sound.clone();
+    flipped[sound.len() / 2] ^= 1;
+    let damaged: [(&[u8], &str); 3] =
+        [(&flipped, "its checksum is wrong"), (&sound[..sound.len() / 2], "not complete"), (&[], "not complete")];
+    for (bytes, reason) in damaged {
+        fs::write(&file, bytes).unwrap();
+        let end = resume(2, &file);
+        assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+        assert!(end.stdout.contains(reason) && end.stdout.contains("the one before"), "{}", end.stdout);
+        assert_same_result(out.path(), whole.path(), "two-blocks");
+    }
+    fs::write(before(out.path()), &sound[..100]).unwrap();
+    let end = resume(2, &file);
+    assert_eq!(end.code, 74, "{}", end.stderr);
+    assert_eq!(end.stderr.matches("fetiplast: cannot go on").count(), 1, "{}", end.stderr);
+    let end = resume(2, &out.path().join("none.h5"));
+    assert!(end.code == 74 && end.stderr.contains("No such file"), "{}", end.stderr);
+}
+
+#[test]
+fn a_changed_scene_is_refused_and_the_difference_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = directory.path().join("blocks.toml");
+    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/src/scene/library/two-blocks.toml")).unwrap();
+    fs::write(&scene, &text).unwrap();
+    let out = directory.path().join("out");
+    let mut arguments = solve(&out, &COARSE, &["--time-limit", "0.001"]);
+    arguments[1] = scene.to_str().unwrap();
+    assert_eq!(run_disturbed(2, &arguments, |_| ()).code, 75);
+    let changed = text.replace("-150.0", "-75.0");
+    assert_ne!(changed, text);
+    fs::write(&scene, changed).unwrap();
+    let file = out.join("blocks.checkpoint.h5");
+    let end = resume(2, &file);
+    assert_eq!(end.code, 65, "{}", end.stderr);
+    assert!(end.stderr.contains("load.top.traction.2 was -150.0, is -75.0"), "{}", end.stderr);
+    assert!(!out.join("blocks.json").exists());
+    fs::write(&scene, text).unwrap();
+    assert_eq!(resume(2, &file).code, 0);
+}
