@@ -8,6 +8,7 @@ mod cascade;
 mod checkpoint;
 mod common;
 mod elements;
+mod faults;
 mod fuzz;
 mod gmsh;
 mod hard;
