@@ -125,7 +125,7 @@ pub struct State {
 }
 
 /// Errors of the stress in the norm of its complementary energy, relative to the stress.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Errors {
     /// Bound on `J(u)` less its minimum on this mesh.
     pub duality_gap: Option<f64>,

@@ -295,6 +295,9 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
             outcome: newton::Outcome::Converged,
             steps: Vec::new(),
             residuals: reached.residuals,
+            // Told in the rows.
+            errors: None,
+            ended_by_accuracy: false,
             energy: reached.energy,
             internal_energy: reached.internal_energy,
             external_work: reached.external_work,
