@@ -1,4 +1,5 @@
-//! From the bodies of a scene to their meshes: bricks by formula, volumes of mesh files read by rank 0.
+//! From the bodies of a scene to their meshes: bricks by formula, other structured bodies made by rank 0, volumes of mesh
+//! files read by it.
 //!
 //! A file that several bodies name is read once. What rank 0 finds wrong is everybody's error.
 
@@ -13,7 +14,7 @@ use crate::element::Kind;
 use crate::mesh::gmsh::{Msh, Problem};
 use crate::mesh::placement::Placement;
 use crate::mesh::quality::Quality;
-use crate::mesh::{Brick, SolidMesh};
+use crate::mesh::{Brick, Mapped, SolidMesh};
 use crate::results::agree::root_texts;
 use crate::scene::{self, Axis, Decomposition, Gmsh, Held, Scene};
 
@@ -33,7 +34,7 @@ pub enum MeshError {
 pub struct Meshes {
     /// In the order of the bodies' names.
     pub bodies: Vec<BodyMesh>,
-    /// On rank 0 the meshes from files, by body; empty elsewhere.
+    /// On rank 0 the meshes of bodies that are no bricks, by body; empty elsewhere.
     pub solids: BTreeMap<usize, SolidMesh>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -62,7 +63,7 @@ impl Meshes {
         let mut counts = comm.all_to_all(outgoing).swap_remove(0).into_iter();
         let mut shape = |body: &scene::Body| match &body.shape {
             scene::Shape::Brick(b) => brick(b),
-            scene::Shape::Gmsh(_) => {
+            _ => {
                 let [nodes, cells, elements] = [(); 3].map(|()| counts.next().expect("every mesh is counted"));
                 Shape::Mesh(Counts { nodes, cells, elements })
             }
@@ -138,8 +139,29 @@ fn read(scene: &Scene) -> Result<Found, MeshError> {
             found.warnings.push(format!("{}: no body is made of volume {}", path.display(), unused.join(", ")));
         }
     }
+    for (index, (name, body)) in scene.body.iter().enumerate() {
+        if let Some(mapped) = mapped(&body.shape) {
+            let mesh = mapped.mesh(kind(body.element));
+            found.warnings.extend(check(scene, name, &mesh)?);
+            found.solids.insert(index, mesh);
+        }
+    }
     count(scene, &found)?;
     Ok(found)
+}
+
+/// The structured body that is to be meshed, if it is one.
+fn mapped(shape: &scene::Shape) -> Option<Mapped> {
+    match shape {
+        scene::Shape::Brick(_) | scene::Shape::Gmsh(_) => None,
+        scene::Shape::Sphere(scene::Sphere { inner, outer, cells }) => {
+            Some(Mapped::Sphere { radii: [*inner, *outer], cells: *cells })
+        }
+        scene::Shape::Cylinder(scene::Cylinder { inner, outer, height, cells }) => {
+            Some(Mapped::Cylinder { radii: [*inner, *outer], height: *height, cells: *cells })
+        }
+        scene::Shape::Grid(scene::Grid { x, y, z }) => Some(Mapped::Grid { planes: [x.clone(), y.clone(), z.clone()] }),
+    }
 }
 
 /// Names of a body's surfaces that the scene uses.
@@ -159,8 +181,8 @@ const POOR_SHAPE: f64 = 0.01;
 fn check(scene: &Scene, body: &str, mesh: &SolidMesh) -> Result<Vec<String>, MeshError> {
     let quality = Quality::of(mesh);
     if !quality.is_sound() {
-        // Sound in the file: the coordinates of the scene have lost its digits.
-        let rule = "gmsh.scale and gmsh.translate leave elements without volume";
+        // Sound by itself: the coordinates of the scene have lost its digits.
+        let rule = "its place and size leave elements without volume";
         return Err(MeshError::Bad(format!("body.{body}: {rule}")));
     }
     let mut warnings = Vec::new();

@@ -7,6 +7,7 @@ mod check;
 pub mod keeper;
 mod resume;
 mod solve;
+mod verify;
 
 use std::path::{Path, PathBuf};
 
@@ -18,6 +19,7 @@ pub use self::check::{Check, check};
 use self::keeper::Signals;
 pub use self::resume::{Resume, resume};
 pub use self::solve::{Cascade, Solve, solve};
+pub use self::verify::{Verify, verify};
 use crate::bodies::MeshError;
 use crate::comm::{Comm, Shares, ordered_sum};
 use crate::monitor::timing::peak_rss_mb;
@@ -49,6 +51,8 @@ pub enum Command {
     Resume(Resume),
     /// Report sizes and warnings of a scene; solves nothing.
     Check(Check),
+    /// Compare the program with closed forms, on meshes that get finer.
+    Verify(Verify),
     /// List the built-in scenes.
     Scenes,
     /// Print a built-in scene as TOML, to start from.
@@ -125,6 +129,7 @@ pub fn run(command: Command, comm: &dyn Comm, signals: Signals) -> Result<i32, F
         Command::Solve(arguments) => solve(arguments, comm, signals),
         Command::Resume(arguments) => resume(arguments, comm, signals),
         Command::Check(arguments) => check(&arguments, comm),
+        Command::Verify(arguments) => verify(&arguments, comm),
         Command::Scenes | Command::Show { .. } => Ok(0),
     }
 }
@@ -138,6 +143,7 @@ impl Command {
                 let known = library::names().collect::<Vec<_>>().join(", ");
                 format!("there is no built-in scene `{name}`: known are {known}")
             })),
+            Self::Verify(arguments) => arguments.refusal().map(Err),
             Self::Solve(_) | Self::Resume(_) | Self::Check(_) => None,
         }
     }

@@ -26,6 +26,7 @@ pub mod scene;
 pub mod simd;
 pub mod study;
 pub mod tensor;
+pub mod verify;
 
 #[cfg(test)]
 mod fixture;

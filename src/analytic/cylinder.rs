@@ -80,6 +80,14 @@ impl CylinderState {
         self.radial_stress(r) + self.intensity / r.max(self.front).powi(2)
     }
 
+    /// Strains at a radius `r` outside the plastic front: along the radius, and around.
+    pub fn strains(&self, r: f64) -> [f64; 2] {
+        let Material { young, poisson, .. } = self.cylinder.material;
+        let (radial, hoop) = (self.radial_stress(r), self.hoop_stress(r));
+        let plane = |along: f64, across: f64| (1.0 + poisson) / young * ((1.0 - poisson) * along - poisson * across);
+        [plane(radial, hoop), plane(hoop, radial)]
+    }
+
     /// Radial displacement of the outer surface, outwards.
     pub fn outer_displacement(&self) -> f64 {
         let m = &self.cylinder.material;
@@ -126,6 +134,24 @@ mod tests {
                 assert!((slope - difference / r).abs() < 1e-9);
                 assert!(difference <= CYLINDER.strength() * (1.0 + 1e-12));
             }
+        }
+    }
+
+    /// The first strain is the derivative of the second times the radius, and both add up to Hooke's law in plane strain.
+    #[test]
+    fn elastic_strains_are_compatible() {
+        for p in [0.05, 0.14] {
+            let state = CYLINDER.loaded(p).expect("below collapse");
+            for r in (0..60).map(|k| 130.0 + f64::from(k)) {
+                let displacement = |r: f64| r * state.strains(r)[1];
+                let slope = (displacement(r + 1e-3) - displacement(r - 1e-3)) / 2e-3;
+                let [radial, around] = state.strains(r);
+                assert!((slope - radial).abs() < 1e-11, "{slope} {radial}");
+                let m = CYLINDER.material;
+                let stress = m.lambda() * (radial + around) + 2.0 * m.shear_modulus() * radial;
+                assert!((stress - state.radial_stress(r)).abs() < 1e-14);
+            }
+            assert!((200.0 * state.strains(200.0)[1] - state.outer_displacement()).abs() < 1e-14);
         }
     }
 

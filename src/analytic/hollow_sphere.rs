@@ -9,7 +9,8 @@
 //!
 //! (Hill, The Mathematical Theory of Plasticity, V.2, for H = 0; integrating equilibrium with the hardening term adds
 //! the rest.) At every radius sigma_t - sigma_r + E kappa / (2 (1 - nu)) = S / r^3 with S = sigma_y c^3; while all is
-//! elastic, S follows from the pressure. A pressure outside superposes a hydrostatic state. Unloading is not covered.
+//! elastic, S follows from the pressure. A pressure outside superposes a hydrostatic state. Unloading is elastic, or not
+//! covered.
 
 use super::bisect;
 use crate::material::Material;
@@ -110,9 +111,56 @@ impl SphereState {
 
     /// Radial displacement at radius `r`, outwards.
     pub fn displacement(&self, r: f64) -> f64 {
+        r * self.strains(r)[1]
+    }
+
+    /// Strains at radius `r`: radial, and in both directions around.
+    pub fn strains(&self, r: f64) -> [f64; 2] {
         let m = &self.sphere.material;
         let shape = (1.0 - m.poisson) * self.intensity / cube(r);
-        r / m.young * ((1.0 - 2.0 * m.poisson) * self.radial_stress(r) + shape)
+        let (radial, excess) = (self.radial_stress(r), self.von_mises(r));
+        // The first is (r times the second)', where r sigma_r' is twice the excess by equilibrium.
+        let along = (1.0 - 2.0 * m.poisson) * (radial + 2.0 * excess) - 2.0 * shape;
+        [along / m.young, ((1.0 - 2.0 * m.poisson) * radial + shape) / m.young]
+    }
+
+    /// What is left when the pressures are taken away, as long as nothing yields on the way back: the difference from the
+    /// elastic state under the same pressures. `None` if something does.
+    pub fn unloaded(&self) -> Option<Unloaded> {
+        let HollowSphere { inner, outer, material } = self.sphere;
+        let elastic = Material::elastic(material.young, material.poisson);
+        let net = -self.radial_stress(inner) - self.outside;
+        let back = HollowSphere { inner, outer, material: elastic }.loaded(self.outside + net, self.outside)?;
+        // The excess of the elastic state is largest inside, where the yield stress has grown most too.
+        let reversed = back.von_mises(inner) - self.von_mises(inner);
+        (reversed <= self.von_mises(inner)).then_some(Unloaded { loaded: *self, back })
+    }
+}
+
+/// A sphere that was loaded and is free again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unloaded {
+    loaded: SphereState,
+    /// Elastic, under the pressures that are gone.
+    back: SphereState,
+}
+
+impl Unloaded {
+    /// Radial displacement at radius `r`, outwards.
+    pub fn displacement(&self, r: f64) -> f64 {
+        self.loaded.displacement(r) - self.back.displacement(r)
+    }
+
+    /// Strains at radius `r`: radial, and in both directions around.
+    pub fn strains(&self, r: f64) -> [f64; 2] {
+        let (loaded, back) = (self.loaded.strains(r), self.back.strains(r));
+        [loaded[0] - back[0], loaded[1] - back[1]]
+    }
+
+    /// Radial stress at radius `r`, and that in both directions around.
+    pub fn stresses(&self, r: f64) -> [f64; 2] {
+        let radial = self.loaded.radial_stress(r) - self.back.radial_stress(r);
+        [radial, self.loaded.hoop_stress(r) - self.back.hoop_stress(r)]
     }
 }
 
@@ -180,6 +228,8 @@ mod tests {
                 assert!((slope + 2.0 * (radial - hoop) / r).abs() < 1e-6);
                 let stretch = (state.displacement(r + h) - state.displacement(r - h)) / (2.0 * h);
                 let around = state.displacement(r) / r;
+                let strains = state.strains(r);
+                assert!((strains[0] - stretch).abs() < 1e-9 && (strains[1] - around).abs() < 1e-16);
                 let response = STEEL.respond(&[stretch, around, around, 0.0, 0.0, 0.0], &History::default());
                 for (a, b) in response.stress.iter().zip([radial, hoop, hoop, 0.0, 0.0, 0.0]) {
                     assert!((a - b).abs() < 1e-4, "{:?} at {r}", response.stress);
@@ -187,6 +237,38 @@ mod tests {
                 assert!((response.kappa - state.kappa(r)).abs() < 1e-9);
                 assert!((state.von_mises(r) - (hoop - radial)).abs() < 1e-9);
             }
+        }
+    }
+
+    /// By the material itself, which remembers the loaded state; and balanced without pressures.
+    #[test]
+    fn what_is_left_after_unloading_is_balanced_and_the_materials_own() {
+        let strain = |[radial, around]: [f64; 2]| [radial, around, around, 0.0, 0.0, 0.0];
+        for inside in [200.0, 500.0, 600.0] {
+            let loaded = SPHERE.loaded(inside, 0.0).expect("below full plasticity");
+            let left = loaded.unloaded().expect("nothing yields on the way back");
+            assert!(left.stresses(100.0)[0].abs() < 1e-10 && left.stresses(200.0)[0].abs() < 1e-10);
+            for r in (0..99).map(|k| 100.5 + k as f64) {
+                let history = STEEL.commit(&strain(loaded.strains(r)), &History::default());
+                let response = STEEL.respond(&strain(left.strains(r)), &history);
+                let [radial, hoop] = left.stresses(r);
+                for (a, b) in response.stress.iter().zip([radial, hoop, hoop, 0.0, 0.0, 0.0]) {
+                    assert!((a - b).abs() < 1e-8, "{:?} at {r}", response.stress);
+                }
+                assert!((left.displacement(r) - r * left.strains(r)[1]).abs() < 1e-15);
+                let h = 1e-3;
+                if (r - loaded.front()).abs() > 2.0 * h {
+                    let slope = (left.stresses(r + h)[0] - left.stresses(r - h)[0]) / (2.0 * h);
+                    assert!((slope + 2.0 * (radial - hoop) / r).abs() < 1e-6);
+                }
+            }
+        }
+        // Perfectly plastic, the wall yields again where 3/2 p / (1 - a^3/b^3) is more than twice the yield stress.
+        let thick = HollowSphere { outer: 300.0, material: Material { hardening: 0.0, ..STEEL }, ..SPHERE };
+        let limit = 2.0 / 1.5 * 450.0 * (1.0 - 1.0 / 27.0);
+        for (inside, is_elastic) in [(0.999 * limit, true), (1.001 * limit, false)] {
+            let loaded = thick.loaded(inside, 0.0).expect("below full plasticity");
+            assert_eq!(loaded.unloaded().is_some(), is_elastic);
         }
     }
 }

@@ -6,8 +6,10 @@
 pub mod blocks;
 pub mod cycle;
 pub mod cylinder;
+pub mod hertz;
 pub mod hollow_sphere;
 pub mod homogeneous;
+pub mod manufactured;
 pub mod nested_spheres;
 
 /// The point of [low, high] where `is_below` turns from true to false, to the last bit.

@@ -2,11 +2,11 @@
 
 use super::integrated;
 use crate::decomposition::Subdomain;
-use crate::element::{Kind, Nodal, Point, hex8, tet4, tet10};
+use crate::element::{Kind, Nodal, Point, hex8, sample, tet4, tet10};
 use crate::mesh::surface;
 
-/// A uniform load on a named surface or in a body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A load on a named surface or in a body.
+#[derive(Clone, Copy, Debug)]
 pub enum Load {
     /// Force per area, global axes.
     Traction {
@@ -29,6 +29,15 @@ pub enum Load {
         /// The force.
         value: [f64; 3],
     },
+    /// Force per volume that varies from place to place, global axes. Scenes have none: it is for manufactured solutions.
+    Field {
+        /// Index of the body.
+        body: usize,
+        /// The force at a place.
+        value: fn([f64; 3]) -> [f64; 3],
+        /// Its factor.
+        factor: f64,
+    },
 }
 
 impl Load {
@@ -38,6 +47,7 @@ impl Load {
             Self::Traction { surface, value } => Self::Traction { surface, value: value.map(|v| factor * v) },
             Self::Pressure { surface, value } => Self::Pressure { surface, value: factor * value },
             Self::BodyForce { body, value } => Self::BodyForce { body, value: value.map(|v| factor * v) },
+            Self::Field { body, value, factor: own } => Self::Field { body, value, factor: factor * own },
         }
     }
 }
@@ -63,14 +73,30 @@ pub fn add(subdomain: &Subdomain, loads: &[Load], forces: &mut [f64]) {
         }
     }
     for load in loads {
-        let Load::BodyForce { body, value } = load else { continue };
-        if *body == subdomain.body {
-            let mut give = |node: u32, volume: f64| give(node, value.map(|v| volume * v));
-            match subdomain.elements.kind() {
-                Kind::Tet4 => share_volumes(tet4::points, &tet4::VALUES, subdomain, &mut give),
-                Kind::Tet10 => share_volumes(tet10::points, &tet10::values_at_points(), subdomain, &mut give),
-                Kind::Hex8 => share_volumes(hex8::points, &hex8::values_at_points(), subdomain, &mut give),
+        match load {
+            Load::BodyForce { body, value } if *body == subdomain.body => {
+                let mut give = |node: u32, volume: f64| give(node, value.map(|v| volume * v));
+                match subdomain.elements.kind() {
+                    Kind::Tet4 => share_volumes(tet4::points, &tet4::VALUES, subdomain, &mut give),
+                    Kind::Tet10 => share_volumes(tet10::points, &tet10::values_at_points(), subdomain, &mut give),
+                    Kind::Hex8 => share_volumes(hex8::points, &hex8::values_at_points(), subdomain, &mut give),
+                }
             }
+            Load::Field { body, value, factor } if *body == subdomain.body => {
+                share_field(subdomain, |place| value(place).map(|v| factor * v), &mut give);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Tells the integral over each element of a field times its nodes' shape functions.
+fn share_field(subdomain: &Subdomain, field: impl Fn([f64; 3]) -> [f64; 3], give: &mut impl FnMut(u32, [f64; 3])) {
+    for nodes in &subdomain.elements {
+        let places: Vec<[f64; 3]> = nodes.iter().map(|&n| subdomain.points[n as usize]).collect();
+        for sample in sample::samples(subdomain.elements.kind(), &places) {
+            let force = field(sample.value(&places)).map(|f| sample.weight * f);
+            nodes.iter().zip(&sample.values).for_each(|(&node, value)| give(node, force.map(|f| value * f)));
         }
     }
 }

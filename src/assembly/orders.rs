@@ -8,7 +8,8 @@ use std::f64::consts::PI;
 use super::pattern::Pattern;
 use super::stiffness;
 use crate::decomposition::{Bodies, Shape, Subdomain, number_bodies};
-use crate::element::{Kind, hex8, tet4, tet10};
+use crate::element::Kind;
+use crate::element::sample::{Sample, samples};
 use crate::material::Material;
 use crate::mesh::Brick;
 use crate::tensor::{Voigt, apply, contract};
@@ -37,40 +38,6 @@ pub fn body_force(x: [f64; 3]) -> [f64; 3] {
         let grad_div: f64 = (0..3).map(|j| C[j] * second(j)).sum();
         PI * PI * (3.0 * mu * C[i] * product - (lambda + mu) * grad_div)
     })
-}
-
-/// A point of an element: its share of the volume, values and gradients of the shape functions.
-struct Sample {
-    weight: f64,
-    values: Vec<f64>,
-    gradients: Vec<[f64; 3]>,
-}
-
-/// 27 points of an element.
-fn samples(kind: Kind, nodes: &[[f64; 3]]) -> Vec<Sample> {
-    let gauss = [(-0.6_f64.sqrt(), 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.6_f64.sqrt(), 5.0 / 9.0)];
-    let sample = |k: usize| {
-        let [(r, a), (s, b), (t, c)] = [gauss[k % 3], gauss[k / 3 % 3], gauss[k / 9]];
-        if kind == Kind::Hex8 {
-            let point = hex8::at(nodes.try_into().unwrap(), &[r, s, t]);
-            let values = hex8::values([r, s, t]).to_vec();
-            return Sample { weight: a * b * c * point.weight, values, gradients: point.gradients.to_vec() };
-        }
-        // The cube folded to a tetrahedron: its points come closer towards the last corners.
-        let [r, s, t] = [r, s, t].map(|x| 0.5 * (1.0 + x));
-        let at = [r * (1.0 - s) * (1.0 - t), s * (1.0 - t), t];
-        let barycentric = [1.0 - at[0] - at[1] - at[2], at[0], at[1], at[2]];
-        let folded = a * b * c / 8.0 * (1.0 - s) * (1.0 - t) * (1.0 - t);
-        if kind == Kind::Tet10 {
-            let point = tet10::at(nodes.try_into().unwrap(), &barycentric);
-            let values = tet10::values(barycentric).to_vec();
-            return Sample { weight: folded * point.weight, values, gradients: point.gradients.to_vec() };
-        }
-        let [point] = tet4::points(nodes.try_into().unwrap()).expect("it has a volume");
-        let weight = folded * 6.0 * point.weight;
-        Sample { weight, values: barycentric.to_vec(), gradients: point.gradients.to_vec() }
-    };
-    (0..27).map(sample).collect()
 }
 
 /// The unit cube with so many cells along each edge.

@@ -1,10 +1,11 @@
 //! Finite elements: their nodes and faces ([`kind`]), where they are integrated, and strains, forces and stiffness there
-//! ([`point`]). Elements take tensors and know no material.
+//! ([`point`]); finer points for what varies inside of one ([`sample`]). Elements take tensors and know no material.
 
 pub mod hex8;
 pub mod kind;
 mod map;
 pub mod point;
+pub mod sample;
 pub mod tet10;
 pub mod tet4;
 

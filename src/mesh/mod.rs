@@ -1,6 +1,7 @@
 //! Meshes: where nodes are and which of them make a cell, an element, a surface.
 //!
-//! [`brick`] numbers and places a structured body without storing it, [`face`] names its six faces. [`gmsh`] reads files
+//! [`brick`] numbers and places a structured body without storing it, [`face`] names its six faces; [`mapped`] bodies are
+//! structured too, but curved or of unequal cells, and stored. [`gmsh`] reads files
 //! into a [`solid`] mesh, with cells [`split`] into tetrahedra where these are wanted, and put in [`placement`].
 //! [`elements`] are known by their nodes; [`faces`] tells which are neighbours, [`surface`] integrates over boundary
 //! faces, [`quality`] counts elements that no computation could use. No displacements, no material.
@@ -10,6 +11,7 @@ pub mod elements;
 pub mod face;
 pub mod faces;
 pub mod gmsh;
+pub mod mapped;
 pub mod placement;
 pub mod quality;
 pub mod solid;
@@ -19,4 +21,5 @@ pub mod surface;
 pub use brick::{Block, Brick};
 pub use elements::Elements;
 pub use face::Face;
+pub use mapped::Mapped;
 pub use solid::SolidMesh;

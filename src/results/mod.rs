@@ -16,7 +16,12 @@ pub mod seal;
 pub mod summary;
 pub mod vtkhdf;
 
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::comm::Comm;
 
 /// Why a file was not written; the same on every rank.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -41,4 +46,15 @@ pub enum OutputError {
         /// What does not fit, on which rank.
         reason: String,
     },
+}
+
+/// Writes one JSON object; numbers that are not finite become null. Collective; rank 0's object counts.
+///
+/// # Errors
+/// [`OutputError::Write`] if the file cannot be written; an earlier one is untouched then.
+pub fn write_json(comm: &dyn Comm, path: &Path, object: &impl Serialize) -> Result<(), OutputError> {
+    let text = serde_json::to_string_pretty(object).unwrap_or_default() + "\n";
+    replace::replace(comm, path, text.len() as u64, |temporary| {
+        agree::on_root(comm, "writing the summary", || fs::write(temporary, &text))
+    })
 }

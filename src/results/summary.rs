@@ -4,14 +4,11 @@
 //! without contact has no gap) are null; so are values that are not finite. All other numbers read back to the same bits.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::OutputError;
-use super::agree::on_root;
-use super::replace::replace;
 use crate::comm::Comm;
 
 /// What a run was about and what came out. Lengths, forces and energies are in the scene's units.
@@ -288,10 +285,7 @@ impl Summary {
     /// # Errors
     /// [`OutputError::Write`] on every rank; an earlier file of that name is untouched then.
     pub fn write(&self, comm: &dyn Comm, path: &Path) -> Result<(), OutputError> {
-        let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        replace(comm, path, text.len() as u64, |temporary| {
-            on_root(comm, "writing the summary", || fs::write(temporary, &text))
-        })
+        super::write_json(comm, path, self)
     }
 }
 

@@ -1,8 +1,11 @@
-//! Bodies: a material, an element and a shape, which is a brick with axis-parallel edges or a volume of a mesh file.
+//! Bodies: a material, an element and a shape, which is a brick with axis-parallel edges, another structured body or a
+//! volume of a mesh file.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+
+use super::mapped::{Cylinder, Grid, Sphere};
 
 /// One body of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,23 +26,23 @@ pub enum Shape {
     Brick(Brick),
     /// A volume of a mesh file.
     Gmsh(Gmsh),
+    /// An octant of a hollow sphere.
+    Sphere(Sphere),
+    /// A quarter of a hollow cylinder.
+    Cylinder(Cylinder),
+    /// A box of unequal cells.
+    Grid(Grid),
 }
 
 impl Body {
     /// The brick, if the body is one.
     pub fn brick(&self) -> Option<&Brick> {
-        match &self.shape {
-            Shape::Brick(brick) => Some(brick),
-            Shape::Gmsh(_) => None,
-        }
+        if let Shape::Brick(brick) = &self.shape { Some(brick) } else { None }
     }
 
     /// The mesh file, if the body is from one.
     pub fn gmsh(&self) -> Option<&Gmsh> {
-        match &self.shape {
-            Shape::Brick(_) => None,
-            Shape::Gmsh(gmsh) => Some(gmsh),
-        }
+        if let Shape::Gmsh(gmsh) = &self.shape { Some(gmsh) } else { None }
     }
 }
 
@@ -51,42 +54,56 @@ struct Section {
     element: Element,
     brick: Option<Brick>,
     gmsh: Option<Gmsh>,
+    sphere: Option<Sphere>,
+    cylinder: Option<Cylinder>,
+    grid: Option<Grid>,
 }
 
 /// Not exactly one shape.
 #[derive(Debug, thiserror::Error)]
 enum ShapeError {
     #[error(
-        "a body needs a shape: brick = {{ origin, size, cells }} or gmsh = {{ file = \"PART.msh\", volume = \"NAME\" }}"
+        "a body needs a shape: brick = {{ origin, size, cells }}, gmsh = {{ file = \"PART.msh\", volume = \"NAME\" }}, \
+         sphere, cylinder or grid"
     )]
     None,
-    #[error("a body has one shape, but both brick and gmsh are given: remove one")]
-    Both,
+    #[error("a body has one shape, but both {0} and {1} are given: remove one")]
+    Both(&'static str, &'static str),
 }
 
 impl TryFrom<Section> for Body {
     type Error = ShapeError;
 
     fn try_from(section: Section) -> Result<Self, ShapeError> {
-        let Section { material, element, brick, gmsh } = section;
-        let shape = match (brick, gmsh) {
-            (Some(brick), None) => Shape::Brick(brick),
-            (None, Some(gmsh)) => Shape::Gmsh(gmsh),
-            (None, None) => return Err(ShapeError::None),
-            (Some(_), Some(_)) => return Err(ShapeError::Both),
-        };
-        Ok(Self { material, element, shape })
+        let Section { material, element, brick, gmsh, sphere, cylinder, grid } = section;
+        let mut shapes = [
+            brick.map(|it| ("brick", Shape::Brick(it))),
+            gmsh.map(|it| ("gmsh", Shape::Gmsh(it))),
+            sphere.map(|it| ("sphere", Shape::Sphere(it))),
+            cylinder.map(|it| ("cylinder", Shape::Cylinder(it))),
+            grid.map(|it| ("grid", Shape::Grid(it))),
+        ]
+        .into_iter()
+        .flatten();
+        let (first, shape) = shapes.next().ok_or(ShapeError::None)?;
+        match shapes.next() {
+            Some((second, _)) => Err(ShapeError::Both(first, second)),
+            None => Ok(Self { material, element, shape }),
+        }
     }
 }
 
 impl From<Body> for Section {
     fn from(body: Body) -> Self {
         let Body { material, element, shape } = body;
-        let (brick, gmsh) = match shape {
-            Shape::Brick(brick) => (Some(brick), None),
-            Shape::Gmsh(gmsh) => (None, Some(gmsh)),
-        };
-        Self { material, element, brick, gmsh }
+        let section = Section { material, element, brick: None, gmsh: None, sphere: None, cylinder: None, grid: None };
+        match shape {
+            Shape::Brick(brick) => Self { brick: Some(brick), ..section },
+            Shape::Gmsh(gmsh) => Self { gmsh: Some(gmsh), ..section },
+            Shape::Sphere(sphere) => Self { sphere: Some(sphere), ..section },
+            Shape::Cylinder(cylinder) => Self { cylinder: Some(cylinder), ..section },
+            Shape::Grid(grid) => Self { grid: Some(grid), ..section },
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use super::decomposition::Decomposition;
 use super::error::Fault;
 use super::held::Held;
 use super::load::Load;
+use super::mapped::{OF_CYLINDER, OF_SPHERE};
 use super::material::Material;
 use super::solver::Solver;
 use super::step::Step;
@@ -80,6 +81,9 @@ fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
     match &body.shape {
         Shape::Brick(it) => brick(key, it),
         Shape::Gmsh(it) => gmsh(&format!("{key}.gmsh"), it),
+        Shape::Sphere(it) => it.check(&format!("{key}.sphere")),
+        Shape::Cylinder(it) => it.check(&format!("{key}.cylinder")),
+        Shape::Grid(it) => it.check(&format!("{key}.grid")),
     }
 }
 
@@ -113,11 +117,15 @@ fn surface(scene: &Scene, key: &str, name: &SurfaceName) -> Checked {
         return require(false, key, name.to_string(), rule);
     };
     let SurfaceName { body: of, surface } = name;
-    let rule = || {
-        let faces = Face::ALL.map(Face::name).join(", ");
-        format!("`{surface}` is not a face of body `{of}`: a brick has {faces}")
+    let (what, known): (&str, &[&str]) = match &body.shape {
+        Shape::Gmsh(_) => return Ok(()),
+        Shape::Brick(_) => ("brick", &Face::ALL.map(Face::name)),
+        Shape::Grid(_) => ("grid", &Face::ALL.map(Face::name)),
+        Shape::Sphere(_) => ("sphere", &OF_SPHERE),
+        Shape::Cylinder(_) => ("cylinder", &OF_CYLINDER),
     };
-    require(body.brick().is_none() || name.face().is_some(), key, name.to_string(), rule())
+    let rule = format!("`{surface}` is not a face of body `{of}`: a {what} has {}", known.join(", "));
+    require(known.contains(&&surface[..]), key, name.to_string(), rule)
 }
 
 fn support(scene: &Scene, key: &str, support: &Support) -> Checked {
@@ -240,7 +248,7 @@ fn decomposition(scene: &Scene) -> Checked {
 fn divided(name: &str, body: &Body, cells: [usize; 3]) -> Checked {
     let key = "decomposition.cells";
     let Some(brick) = body.brick() else {
-        let rule = format!("body {name} is from a mesh file and has no rows of cells: use method = \"metis\"");
+        let rule = format!("body {name} is no brick, so that it cannot be cut into bricks: use method = \"metis\"");
         return require(false, key, cells, rule);
     };
     for axis in Axis::ALL {

@@ -15,6 +15,7 @@ mod error;
 mod held;
 pub mod library;
 mod load;
+mod mapped;
 mod material;
 mod overrides;
 mod read;
@@ -34,6 +35,7 @@ pub use decomposition::{Decomposition, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use held::Held;
 pub use load::Load;
+pub use mapped::{Cylinder, Grid, Sphere};
 pub use material::Material;
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
 pub use step::Step;
@@ -115,6 +117,9 @@ impl Scene {
         for (name, body) in &mut scene.body {
             match &mut body.shape {
                 Shape::Brick(brick) => brick.refine(level),
+                Shape::Sphere(sphere) => sphere.refine(level),
+                Shape::Cylinder(cylinder) => cylinder.refine(level),
+                Shape::Grid(grid) => grid.refine(level),
                 Shape::Gmsh(_) if level > 1 => return Err(SceneError::LevelOfMesh { level, body: name.clone() }),
                 Shape::Gmsh(_) => {}
             }
@@ -159,8 +164,8 @@ impl Scene {
         self.contact.values().flat_map(Contact::surfaces).any(|surface| surface.body == body)
     }
 
-    /// Sentences about what is legal but easily a mistake: bricks that only contact can hold. Bodies from mesh files are
-    /// looked at when their meshes are read.
+    /// Sentences about what is legal but easily a mistake: bricks that only contact can hold. Other bodies are looked at when
+    /// their meshes are there.
     pub fn warnings(&self) -> Vec<String> {
         let bricks = self.body.iter().filter(|(_, body)| body.brick().is_some());
         bricks.filter_map(|(name, _)| Held::brick(self, name).warning()).collect()

@@ -187,6 +187,43 @@ fn bodies_are_checked() {
 }
 
 #[test]
+fn structured_bodies_are_read_refined_and_checked() {
+    let other = |shape: &str, surface: &str, level: usize| {
+        let text = ONE.replace("brick = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }", shape);
+        let text = text.replace("[decomposition]\ncells = [2, 2, 2]\n", "").replace("block.zmin", surface);
+        Scene::from_text(&text, "one.toml", level, &[])
+    };
+    let sphere = "sphere = { inner = 1, outer = 2, cells = [3, 4] }";
+    let cylinder = "cylinder = { inner = 1, outer = 2, height = 3, cells = [4, 5, 6] }";
+    let grid = "grid = { x = [0, 1, 4], y = [0, 2], z = [-1, 0] }";
+    for (shape, surface, refined) in [
+        (sphere, "block.outer", Shape::Sphere(Sphere { inner: 1.0, outer: 2.0, cells: [6, 8] })),
+        (cylinder, "block.top", Shape::Cylinder(Cylinder { inner: 1.0, outer: 2.0, height: 3.0, cells: [8, 10, 12] })),
+        (
+            grid,
+            "block.zmin",
+            Shape::Grid(Grid { x: vec![0.0, 0.5, 1.0, 2.5, 4.0], y: vec![0.0, 1.0, 2.0], z: vec![-1.0, -0.5, 0.0] }),
+        ),
+    ] {
+        let scene = other(shape, surface, 2).unwrap();
+        assert_eq!(scene.body["block"].shape, refined);
+        assert_eq!(Scene::from_text(&scene.to_toml(), "again.toml", 1, &[]).unwrap(), scene);
+    }
+    let refused = |shape: &str, surface: &str, parts: &[&str]| assert_says(other(shape, surface, 1), parts);
+    refused(sphere, "block.top", &["`top` is not a face", "a sphere has inner, outer, x0"]);
+    refused(cylinder, "block.zmax", &["`zmax` is not a face", "a cylinder has", "bottom"]);
+    refused(grid, "block.inner", &["`inner` is not a face", "a grid has xmin"]);
+    refused(&sphere.replace("outer = 2", "outer = 1"), "block.inner", &["sphere.outer = 1", "larger"]);
+    refused(&sphere.replace("[3, 4]", "[0, 4]"), "block.inner", &["sphere.cells = [0, 4]", "at least 1"]);
+    refused(&sphere.replace("[3, 4]", "[30000, 4]"), "block.inner", &["sphere.cells", "too many"]);
+    refused(&cylinder.replace("inner = 1", "inner = 0"), "block.inner", &["cylinder.inner = 0", "positive"]);
+    refused(&cylinder.replace("height = 3", "height = inf"), "block.inner", &["cylinder.height"]);
+    refused(&grid.replace("[0, 2]", "[2, 0]"), "block.zmin", &["grid.y = [2.0, 0.0]", "ascending"]);
+    refused(&grid.replace("[0, 2]", "[2]"), "block.zmin", &["grid.y", "at least two"]);
+    refused(&(grid.to_owned() + "\n" + sphere), "block.zmin", &["both sphere and grid"]);
+}
+
+#[test]
 fn bodies_from_mesh_files_are_checked() {
     let gmsh = |rest: &str| {
         let text = ONE.replace("brick = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }", rest);

@@ -21,3 +21,4 @@ mod ranks;
 mod results;
 mod rigid;
 mod ring;
+mod verify;

@@ -83,6 +83,13 @@ pub fn check(ranks: usize, scene: &str, level: usize, sets: &[&str]) -> Run {
     scene_command("check", ranks, scene, level, sets, &[], tempfile::tempdir().unwrap())
 }
 
+/// Runs `verify` with these arguments.
+pub fn verify(ranks: usize, arguments: &[&str]) -> Run {
+    let directory = tempfile::tempdir().unwrap();
+    let summary = directory.path().join(SUMMARY);
+    launch(ranks, &[&["verify", "--summary", summary.to_str().unwrap()], arguments].concat(), directory)
+}
+
 fn scene_command(
     command: &str,
     ranks: usize,

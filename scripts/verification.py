@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""Errors of the program against closed forms, with each element, on meshes that get finer.
+
+    scripts/verification.py run [CASE ...] [--np 2]    runs `fetiplast verify`, keeps bench-results/verification.json
+    scripts/verification.py write                      makes bench-results/verification.md of it
+
+All cases take minutes. Needs a release build.
+"""
+
+import argparse
+import json
+import math
+import pathlib
+import subprocess
+import tempfile
+
+from bench.markdown import table
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+RECORDS = ROOT / "bench-results/verification.json"
+TABLE = ROOT / "bench-results/verification.md"
+
+INTRODUCTION = """# The program against closed forms
+
+Written by `scripts/verification.py write` from [verification.json](verification.json), which `scripts/verification.py run`
+measured on {ranks} ranks. Relative errors, with counts of Newton steps and applications of F; in brackets the observed order
+between a mesh and the one before. Below each table what is demanded; *missed* demands make `fetiplast verify` fail.
+"""
+
+
+def run(arguments):
+    """Results of the cases replace those of earlier runs."""
+    records = json.loads(RECORDS.read_text()) if RECORDS.exists() else {"cases": []}
+    with tempfile.TemporaryDirectory() as directory:
+        summary = pathlib.Path(directory) / "summary.json"
+        command = ["mpirun", "-np", str(arguments.np), str(ROOT / "target/release/fetiplast"), "verify"]
+        # A missed demand is a result too.
+        subprocess.run([*command, "--summary", str(summary), *arguments.cases], check=False)
+        new = json.loads(summary.read_text())
+    measured = {case["case"] for case in new["cases"]}
+    cases = [case for case in records["cases"] if case["case"] not in measured] + new["cases"]
+    RECORDS.write_text(json.dumps({"ranks": arguments.np, "cases": cases}, indent=1) + "\n")
+
+
+def cell(row, before, name):
+    error = row["errors"][name]
+    if error is None:
+        return "-"
+    text = f"{error:.1e}"
+    earlier = before and before["errors"][name]
+    if earlier and abs(error) > 1e-8:
+        order = math.log(abs(earlier / error)) / math.log(row["level"] / before["level"])
+        text += f" ({order:.2f})"
+    return text
+
+
+def write(_):
+    records = json.loads(RECORDS.read_text())
+    text = INTRODUCTION.format(ranks=records["ranks"])
+    for name in dict.fromkeys(case["case"] for case in records["cases"]):
+        elements = [case for case in records["cases"] if case["case"] == name]
+        errors = list(elements[0]["rows"][0]["errors"])
+        rows, demands = [], []
+        for case in elements:
+            before = None
+            for row in case["rows"]:
+                numbers = [row["level"], row["nodes"], row["newton_iterations"], row["hessian_multiplications"]]
+                rows.append([case["element"], *numbers, *(cell(row, before, error) for error in errors)])
+                before = row
+            met = [f"{'' if verdict['met'] else '**missed** '}{verdict['text']}" for verdict in case["verdicts"]]
+            demands.append(f"- {case['element']}: " + ("; ".join(met) or "nothing demanded"))
+        text += f"\n## {name}\n\n" + elements[0]["about"] + "\n\n"
+        text += table(["element", "level", "nodes", "Newton", "F", *errors], rows) + "\n" + "\n".join(demands) + "\n"
+    TABLE.write_text(text)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(required=True)
+    running = commands.add_parser("run")
+    running.add_argument("cases", nargs="*", metavar="CASE")
+    running.add_argument("--np", type=int, default=2)
+    running.set_defaults(act=run)
+    commands.add_parser("write").set_defaults(act=write)
+    arguments = parser.parse_args()
+    arguments.act(arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,107 @@
+//! A thick cylinder in plane strain under pressure: elastic, and perfectly plastic in increments.
+
+use super::radial::Radial;
+use super::run::Run;
+use super::{Case, Demand, Error, material_line, orders};
+use crate::analytic::cylinder::{Cylinder, CylinderState};
+use crate::material::Material;
+use crate::scene::Element;
+
+/// Of de Souza Neto, Peric and Owen, 7.5, in GPa.
+pub(super) const STEEL: Material =
+    Material { young: 210.0, poisson: 0.3, yield_stress: Some(0.24), hardening: 0.0, kinematic_hardening: 0.0 };
+
+pub(super) const CYLINDER: Cylinder = Cylinder { inner: 100.0, outer: 200.0, material: STEEL };
+
+/// The cylinder under a pressure.
+pub struct Pressed {
+    name: &'static str,
+    about: &'static str,
+    pressure: f64,
+    increments: usize,
+}
+
+/// All of them.
+pub const CASES: [Pressed; 2] = [
+    Pressed { name: "cylinder-elastic", about: "a thick cylinder under pressure", pressure: 0.1, increments: 1 },
+    Pressed {
+        name: "cylinder-plastic",
+        about: "a thick cylinder, perfectly plastic in a part, in increments",
+        pressure: 0.18,
+        increments: 20,
+    },
+];
+
+/// Supports in the planes of symmetry and across the axis.
+pub(super) fn plane_strain(body: &str) -> String {
+    let plane = |(surface, axis): (&str, &str)| {
+        format!("\n    support.{surface} = {{ surface = \"{body}.{surface}\", fix = [\"{axis}\"] }}")
+    };
+    [("x0", "x"), ("y0", "y"), ("bottom", "z"), ("top", "z")].map(plane).concat()
+}
+
+impl Pressed {
+    fn state(&self) -> CylinderState {
+        CYLINDER.loaded(self.pressure).expect("the pressure is below the limit")
+    }
+}
+
+/// Hill's solution is Tresca's, which differs a little from von Mises' along the axis.
+const BIAS: f64 = 0.01;
+
+impl Case for Pressed {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn about(&self) -> &'static str {
+        self.about
+    }
+
+    fn scene(&self) -> String {
+        let (material, planes) = (material_line("steel", &STEEL), plane_strain("wall"));
+        let (pressure, increments) = (self.pressure, self.increments);
+        format!(
+            r#"
+            step = [{{ increments = {increments} }}]
+            {material}
+            {planes}
+            load.bore = {{ surface = "wall.inner", pressure = {pressure:?} }}
+            [body.wall]
+            material = "steel"
+            element = "tet4"
+            cylinder = {{ inner = 100.0, outer = 200.0, height = 50.0, cells = [2, 1, 1] }}"#
+        )
+    }
+
+    fn levels(&self, element: Element) -> Vec<usize> {
+        match (element, self.increments) {
+            (Element::Tet10, 1) => vec![2, 4, 8],
+            (_, 1) => vec![4, 8, 16],
+            (Element::Tet10, _) => vec![2, 4],
+            _ => vec![4, 8],
+        }
+    }
+
+    fn errors(&self, run: &Run) -> Vec<Error> {
+        let state = self.state();
+        let outer = CYLINDER.outer;
+        let radius = |x: [f64; 3]| x[0].hypot(x[1]);
+        let at_outer = run.nodes(
+            |_, x| (radius(x) / outer - 1.0).abs() < 1e-6,
+            |x, u| (x[0] * u[0] + x[1] * u[1]) / radius(x) / state.outer_displacement() - 1.0,
+        );
+        if self.increments > 1 {
+            let demand = if run.element() == Element::Tet4 { Demand::Shown } else { Demand::Finest(BIAS) };
+            return vec![Error::new("outer radius", at_outer, demand)];
+        }
+        let exact = |_, r: f64| (r * state.strains(r)[1], state.strains(r));
+        let [energy, displacement] = run.norms(&Radial { about_axis: true, state: exact });
+        let demands = orders(run.element(), false);
+        vec![
+            Error::new("energy norm", energy, demands[0]),
+            Error::new("displacement", displacement, demands[1]),
+            Error::new("outer radius", at_outer, Demand::Shown),
+        ]
+    }
+}

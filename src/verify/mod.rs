@@ -1,0 +1,206 @@
+//! Verification: the program against closed forms, on meshes that get finer.
+//!
+//! A [`Case`] is a scene with a solution that the program does not know ([`crate::analytic`]). It goes through the whole
+//! pipeline, as a user's scene would, on each of its meshes and with each of its elements; a [`Measured`] says what became
+//! of its errors, and whether they are as small, or fall as fast, as they must ([`Demand`]).
+
+mod blocks;
+mod cylinders;
+mod hertz;
+mod homogeneous;
+mod limits;
+mod manufactured;
+mod measured;
+mod radial;
+mod run;
+mod spheres;
+
+use serde::Serialize;
+
+use crate::comm::Comm;
+use crate::material::Material;
+use crate::scene::{Element, Scene, SceneError};
+use crate::study::StudyError;
+pub use measured::{Demand, Error, Measured, Row, Verdict};
+pub use run::Run;
+
+/// A scene with a known solution.
+pub trait Case: Sync {
+    /// What users call it.
+    fn name(&self) -> &'static str;
+
+    /// What it is, in one line.
+    fn about(&self) -> &'static str;
+
+    /// Its scene at level 1 as TOML. Elements are replaced.
+    fn scene(&self) -> String;
+
+    /// The meshes to solve it on, as levels of the scene, coarse to fine. If there are none, the element is left out.
+    fn levels(&self, element: Element) -> Vec<usize>;
+
+    /// What acts in the first body instead of the scene's first load, which then is a body force.
+    fn force(&self) -> Option<fn([f64; 3]) -> [f64; 3]> {
+        None
+    }
+
+    /// How the history must end.
+    fn end(&self, _: Element) -> End {
+        End::Reached
+    }
+
+    /// The errors of a run. Collective.
+    fn errors(&self, run: &Run) -> Vec<Error>;
+}
+
+/// How a history must end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// All of it converges.
+    Reached,
+    /// It goes beyond what can be carried, and must be given up.
+    Early,
+    /// Nobody knows.
+    Either,
+}
+
+/// Every case, cheapest first.
+pub fn cases() -> Vec<&'static dyn Case> {
+    let mut cases: Vec<&'static dyn Case> = Vec::new();
+    cases.extend(homogeneous::CASES.iter().map(|case| case as &dyn Case));
+    cases.extend(blocks::CASES.iter().map(|case| case as &dyn Case));
+    cases.extend(manufactured::CASES.iter().map(|case| case as &dyn Case));
+    cases.extend(spheres::HOLLOW.iter().map(|case| case as &dyn Case));
+    cases.push(&spheres::Nested);
+    cases.extend(cylinders::CASES.iter().map(|case| case as &dyn Case));
+    cases.extend(limits::WALLS.iter().map(|case| case as &dyn Case));
+    cases.push(&limits::Footing);
+    cases.push(&hertz::Ball);
+    cases
+}
+
+/// The cases of these names, all if there are none.
+///
+/// # Errors
+/// A name that no case has, with a list of those there are.
+pub fn select(names: &[String]) -> Result<Vec<&'static dyn Case>, String> {
+    let known = cases();
+    if let Some(unknown) = names.iter().find(|name| known.iter().all(|case| case.name() != *name)) {
+        let listed: String = known.iter().map(|case| format!("\n  {:<24}{}", case.name(), case.about())).collect();
+        return Err(format!("there is no case `{unknown}`: known are{listed}"));
+    }
+    Ok(known.into_iter().filter(|case| names.is_empty() || names.iter().any(|name| name == case.name())).collect())
+}
+
+/// Tolerances that leave the error of the mesh alone.
+const TIGHT: [&str; 3] =
+    ["solver.newton_tolerance=1e-9", "solver.residual_tolerance=1e-9", "solver.qp_tolerance=1e-12"];
+
+/// Solves a case on all its meshes with an element, and tells of each. Collective.
+///
+/// # Errors
+/// If the scene of the case has no discrete problem.
+pub fn measure(
+    case: &dyn Case,
+    element: Element,
+    comm: &dyn Comm,
+    tell: &mut dyn FnMut(&Measured),
+) -> Result<Measured, StudyError> {
+    let mut measured =
+        Measured { case: case.name(), about: case.about(), element, rows: Vec::new(), verdicts: Vec::new() };
+    for level in case.levels(element) {
+        let scene = at_level(case, element, level).expect("scenes of cases are sound");
+        let run = Run::new(case, scene, level, comm)?;
+        measured.rows.push(run.row(case.errors(&run), case.end(element)));
+        tell(&measured);
+    }
+    measured.verdicts = measured.judge();
+    Ok(measured)
+}
+
+fn at_level(case: &dyn Case, element: Element, level: usize) -> Result<Scene, SceneError> {
+    let text = case.scene();
+    let plain = Scene::from_text(&text, case.name(), 1, &[])?;
+    let name = element_name(element);
+    let elements = plain.body.keys().map(|body| format!("body.{body}.element={name}"));
+    let sets: Vec<String> = elements.chain(TIGHT.map(str::to_owned)).collect();
+    Scene::from_text(&text, case.name(), level, &sets)
+}
+
+/// As in scene files.
+pub fn element_name(element: Element) -> &'static str {
+    match element {
+        Element::Tet4 => "tet4",
+        Element::Tet10 => "tet10",
+        Element::Hex8 => "hex8",
+    }
+}
+
+/// The paper's steel, in MPa.
+const PAPER: Material = Material {
+    young: 210_000.0,
+    poisson: 0.29,
+    yield_stress: Some(450.0),
+    hardening: 10_000.0,
+    kinematic_hardening: 0.0,
+};
+
+/// A material as a line of a scene.
+fn material_line(name: &str, material: &Material) -> String {
+    let Material { young, poisson, yield_stress, hardening, .. } = material;
+    let limit = yield_stress.map_or(String::new(), |limit| format!(", yield_stress = {limit:?}"));
+    format!("material.{name} = {{ young = {young:?}, poisson = {poisson:?}{limit}, hardening = {hardening:?} }}")
+}
+
+/// Orders in energy and displacement. A plastic front, where second derivatives jump, costs up to half an order; linear
+/// elements feel it in the displacement only.
+fn orders(element: Element, has_front: bool) -> [Demand; 2] {
+    match (element, has_front) {
+        (Element::Tet10, false) => [2.0, 3.0],
+        (Element::Tet10, true) => [1.5, 2.5],
+        (Element::Tet4 | Element::Hex8, false) => [1.0, 2.0],
+        (Element::Tet4 | Element::Hex8, true) => [1.0, 1.5],
+    }
+    .map(Demand::Order)
+}
+
+/// Elements in the order of the report.
+pub const ELEMENTS: [Element; 3] = [Element::Tet4, Element::Hex8, Element::Tet10];
+
+/// All results, for scripts.
+#[derive(Debug, Default, Serialize)]
+pub struct Report {
+    /// One for each case and element.
+    pub cases: Vec<Measured>,
+    /// Whether all demands are met.
+    pub passed: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_select() {
+        let names: Vec<&str> = cases().iter().map(|case| case.name()).collect();
+        let mut unique = names.clone();
+        unique.sort_unstable();
+        unique.dedup();
+        assert_eq!(unique.len(), names.len());
+        let one = select(&[names[1].to_owned()]).expect("it is known");
+        assert_eq!(one.iter().map(|case| case.name()).collect::<Vec<_>>(), [names[1]]);
+        assert_eq!(select(&[]).expect("all").len(), names.len());
+        let refusal = select(&["none".to_owned()]).err().expect("it is unknown");
+        assert!(refusal.contains("`none`") && names.iter().all(|name| refusal.contains(name)), "{refusal}");
+    }
+
+    #[test]
+    fn every_scene_is_sound_with_every_element_and_level() {
+        for case in cases() {
+            for element in ELEMENTS {
+                for level in case.levels(element) {
+                    at_level(case, element, level).unwrap_or_else(|error| panic!("{}: {error}", case.name()));
+                }
+            }
+        }
+    }
+}
