@@ -36,6 +36,7 @@ with tempfile.TemporaryDirectory() as name:
     page = files[precision.RESULTS / "precision.md"]
     # 0.25 n^-2 of 1.
     assert "| tet4, n = 5 | 1e-4 | active-set | 10 | -0.99 | 1.00 % | 7 | 5 | 3.0 |" in page, page
+    assert "Not measured yet: tet4, n = 5, active-set, 1e-2; hex8, n = 5, active-set, 1e-2; tet10" in page, "of 1e-4 all are there"
     assert "J* = -1, order p = 2.00" in page
     assert precision.RESULTS / "precision-time.svg" not in files, "other work ran beside"
 print("Work against precision: passed.")

@@ -190,6 +190,9 @@ def contents(folder):
     text += [f"![{path.stem}]({path.name})\n" for path in files]
     head = ["mesh", "Newton tolerance", "QP", "primal unknowns", "J", "error", "Newton steps", "F", "GB read", "MiB", "s"]
     text += [table(head, rows(records, exact))]
+    kinds = [key_of(run.label) for run in runs(ELEMENTS, None, TOLERANCES, SOLVERS)]
+    missing = [f"{e}, n = {n}, {q}, {t}" for e, n, t, q in kinds if (e, n, t, q) not in records]
+    text += [f"Not measured yet: {'; '.join(missing)}.\n"] if missing else []
     commits = sorted({record["provenance"]["commit"][:12] for record in records.values()})
     text += [f"Program: {', '.join(commits)}, {RANKS} ranks.\n"]
     return files | {RESULTS / "precision.md": "\n".join(text)}
