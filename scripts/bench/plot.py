@@ -113,9 +113,10 @@ def bars(title, x_label, y_label, columns):
 
 
 def decades(least, most):
-    """The powers of ten from one at or below to one at or above."""
+    """The powers of ten in a range; where there are fewer than two, with their double and fivefold."""
     first, last = math.floor(math.log10(least)), math.ceil(math.log10(most))
-    return [x for x in (10.0**k for k in range(first, last + 1)) if least <= x <= most]
+    tens = [x for x in (10.0**k for k in range(first, last + 1)) if least <= x <= most]
+    return tens if len(tens) > 1 else [x for x in ticks(least, most) if least <= x <= most]
 
 
 def ticks(least, most):
