@@ -76,6 +76,7 @@ MIRRORED = ["body.upper.brick.origin.0=-600.0", "support.left.surface=lower.xmax
 AXIS, ANGLE = [1.0, 2.0, 3.0], 40.0
 ROTATED = both("body.*.gmsh.rotate", f"{{axis={AXIS}, angle_deg={ANGLE}}}")
 ROTATED += [f"load.top.traction={turned([0.0, 0.0, -150.0], AXIS, ANGLE)}"]
+STRONG = ["material.lower.young=2.1e11", "material.lower.yield_stress=4.5e8", "material.lower.hardening=1e10"]
 RENUMBERED = both("body.*.gmsh.file", "renumbered.msh")
 PLATE = ["body.upper.brick.size.2=20.0", "body.upper.brick.cells=[30, 10, 1]", "load.top.traction.2=-0.05"]
 PLATE += ["decomposition.subdomains=12"]
@@ -96,7 +97,7 @@ CASES = [
     Case("H = 0, above the limit load", both("material.*.hardening", 0.0) + ["load.top.traction.2=-400"], converges=False),
     Case("upper body 1e6 times as stiff", ["material.upper.young=2.1e11", SOFT]),
     Case("lower body 1e6 times as stiff", ["material.lower.young=2.1e11", SOFT]),
-    Case("lower body 1e6 times as stiff, yielding", ["material.lower.young=2.1e11"]),
+    Case("lower body 1e6 times as stiff and as strong", STRONG),
     Case("beam 1:100 on a block, hex8", HEX8 + SLENDER, scene=ELASTIC),
     Case("plate of one element, 1:150, hex8", HEX8 + PLATE, scene=ELASTIC),
     Case("flat elements 1:25", ["body.upper.brick.size.2=40.0", "load.top.traction.2=-0.1"], scene=ELASTIC),

@@ -251,7 +251,7 @@ fn bodies_from_mesh_files_are_checked() {
         |axis: &str, angle: &str| format!("gmsh = {{ file = 'a', rotate = {{ axis = {axis}, angle_deg = {angle} }} }}");
     refused(&turned("[0, 0, 0]", "3"), &["body.block.gmsh.rotate.axis", "not all zero"]);
     refused(&turned("[0, 0, 1]", "inf"), &["body.block.gmsh.rotate.angle_deg", "finite"]);
-    refused("gmsh = { file = 'a' }\n[decomposition]\ncells = [1, 1, 1]", &["body block is from a mesh file", "metis"]);
+    refused("gmsh = { file = 'a' }\n[decomposition]\ncells = [1, 1, 1]", &["body block is no brick", "metis"]);
     let text = scene.to_toml();
     assert_says(Scene::from_text(&text, "one.toml", 2, &[]), &["level 2", "body block", "gmsh -refine"]);
 }
