@@ -42,7 +42,7 @@ pub enum SceneError {
     Level,
     /// Meshes from files are as fine as they are.
     #[error(
-        "level {level} refines bricks only, and body {body} is from a mesh file: use level 1 and refine the mesh, as with \
+        "level {level} refines bodies that a scene describes, and body {body} is from a mesh file: use level 1 and refine the mesh, as with \
          `gmsh -refine` or `Mesh.MeshSizeFactor = 0.5;`"
     )]
     LevelOfMesh {

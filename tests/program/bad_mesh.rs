@@ -213,10 +213,7 @@ fn elements_that_cannot_be_computed_with_are_counted() {
 
 #[test]
 fn what_the_scene_wants_of_a_mesh_must_be_possible() {
-    scene_refused(
-        &["decomposition.cells=[1, 1, 1]"],
-        &["decomposition.cells", "body above is from a mesh file", "metis"],
-    );
+    scene_refused(&["decomposition.cells=[1, 1, 1]"], &["decomposition.cells", "body above is no brick", "metis"]);
     scene_refused(&["decomposition.subdomains=49"], &["decomposition.subdomains = 49", "only 48 elements"]);
     scene_refused(&["body.below.gmsh.translate=[1e30, 0, 0]"], &["body.below", "gmsh.translate", "without volume"]);
     scene_refused(&["body.below.gmsh.scale=0"], &["body.below.gmsh.scale = 0.0", "positive"]);
