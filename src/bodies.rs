@@ -182,8 +182,11 @@ fn check(scene: &Scene, body: &str, mesh: &SolidMesh) -> Result<Vec<String>, Mes
     let quality = Quality::of(mesh);
     if !quality.is_sound() {
         // Sound by itself: the coordinates of the scene have lost its digits.
-        let rule = "its place and size leave elements without volume";
-        return Err(MeshError::Bad(format!("body.{body}: {rule}")));
+        let keys = match scene.body[body].gmsh() {
+            Some(_) => "gmsh.scale and gmsh.translate",
+            None => "its radii, lengths and cells",
+        };
+        return Err(MeshError::Bad(format!("body.{body}: {keys} leave elements without volume")));
     }
     let mut warnings = Vec::new();
     if quality.worst_shape < POOR_SHAPE {
