@@ -38,7 +38,9 @@ def run(arguments):
         subprocess.run([*command, "--summary", str(summary), *arguments.cases], check=False)
         new = json.loads(summary.read_text())
     measured = {case["case"] for case in new["cases"]}
+    order = list(dict.fromkeys(case["case"] for case in records["cases"] + new["cases"]))
     cases = [case for case in records["cases"] if case["case"] not in measured] + new["cases"]
+    cases.sort(key=lambda case: order.index(case["case"]))
     RECORDS.write_text(json.dumps({"ranks": arguments.np, "cases": cases}, indent=1) + "\n")
 
 
