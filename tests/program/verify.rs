@@ -26,9 +26,9 @@ fn homogeneous_states_are_exact_with_every_element() {
 /// The whole pipeline converges as its elements promise, on bricks and on curved bodies.
 #[test]
 fn smooth_solutions_have_the_orders_of_their_elements() {
-    let run = verify(2, &["manufactured-elastic", "manufactured-plastic", "sphere-elastic"]);
+    let run = verify(2, &["manufactured-elastic", "sphere-elastic"]);
     assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
-    assert_eq!(run.summary()["cases"].as_array().unwrap().len(), 9);
+    assert_eq!(run.summary()["cases"].as_array().unwrap().len(), 6);
 }
 
 #[test]
