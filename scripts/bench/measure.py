@@ -94,7 +94,7 @@ def solve(program, run, folder):
         watch = time.monotonic()
         done = subprocess.run(command, env=program.environment, capture_output=True, text=True)
         seconds = time.monotonic() - watch
-        found = json.loads(summary.read_text()) if summary.exists() else None
+        found = read_summary(summary)
     if done.returncode:
         print(done.stdout + done.stderr, file=sys.stderr)
     return {
@@ -107,6 +107,15 @@ def solve(program, run, folder):
             "load_average": load,
         },
     }
+
+
+def read_summary(file):
+    """The summary of a run, nothing if it wrote none; without the command line, which has paths of one machine."""
+    if not file.exists():
+        return None
+    summary = json.loads(file.read_text())
+    summary.get("provenance", {}).pop("command_line", None)
+    return summary
 
 
 def origin(summary):
