@@ -9,8 +9,7 @@ use std::collections::{HashMap, HashSet};
 use crate::assembly::internal;
 use crate::comm::{Comm, all_gather_u64};
 use crate::contact::ContactPair;
-use crate::decomposition::bricks::Boxes;
-use crate::decomposition::{BodyMesh, Subdomain};
+use crate::decomposition::{BodyMesh, Subdomain, bricks};
 use crate::feti::Torn;
 use crate::material::Material;
 use crate::mesh::Brick;
@@ -107,33 +106,30 @@ pub fn closed_contacts(
     fine_pairs.iter().map(|pair| closed.contains(&(pair.contact, nearest(pair.slave)))).collect()
 }
 
-/// Cost of a subdomain that yields, in those of one that is elastic and has congruent ones (10^3 cells, factorised in
-/// most steps; `benches/kernels.rs`, and where ranks wait at level 3).
-const YIELDING: u64 = 6;
-
-/// What the boxes of a finer mesh are likely to cost, from where the coarse one yields. Collective.
-pub fn costs<'a>(
+/// Which of the boxes of so many cells of each body of a finer mesh, x fastest, are likely to yield, from where the
+/// coarse one does. Collective.
+pub fn yielding<'a>(
     comm: &dyn Comm,
     coarse: (&[BodyMesh], &[Subdomain], &Torn),
     material: impl Fn(usize) -> &'a Material,
-    boxes: &Boxes,
-) -> Vec<u64> {
-    let (bodies, subdomains, u) = coarse;
-    let numbers = boxes.numbers();
-    let mut yielding = HashSet::new();
+    fine: (&[BodyMesh], [usize; 3]),
+) -> Vec<Vec<bool>> {
+    let (coarse_bodies, subdomains, u) = coarse;
+    let (bodies, cells) = fine;
+    let mut found = HashSet::new();
     for (subdomain, u) in subdomains.iter().zip(u) {
-        let (body, brick) = (subdomain.body, brick(&bodies[subdomain.body]));
+        let (body, brick) = (subdomain.body, brick(&coarse_bodies[subdomain.body]));
         for nodes in internal::yielding(subdomain, material(body), &[], u) {
             let sum = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>();
             let centre = |a: usize| sum(a) / nodes.len() as f64;
             let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);
-            yielding.insert(numbers[body][boxes.around(body, place)] as u64);
+            found.insert([body as u64, bricks::around(&bodies[body], cells, place) as u64]);
         }
     }
-    let mut costs = vec![1; boxes.count()];
-    let mine: Vec<u64> = yielding.into_iter().collect();
-    all_gather_u64(comm, &mine).into_iter().for_each(|number| costs[number as usize] = YIELDING);
-    costs
+    let mut result: Vec<Vec<bool>> = bodies.iter().map(|body| vec![false; bricks::count(body, cells)]).collect();
+    let found: Vec<u64> = found.into_iter().flatten().collect();
+    all_gather_u64(comm, &found).chunks_exact(2).for_each(|at| result[at[0] as usize][at[1] as usize] = true);
+    result
 }
 
 #[cfg(test)]

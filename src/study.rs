@@ -19,7 +19,6 @@ use crate::comm::Comm;
 use crate::constraint::Kind;
 use crate::contact::ContactError;
 use crate::decomposition::Cut;
-use crate::decomposition::bricks::Boxes;
 use crate::decomposition::sums::NodeSums;
 use crate::decomposition::twins::{alike, twins};
 use crate::feti::Torn;
@@ -47,7 +46,7 @@ use crate::results::summary::{StepRow, Summary};
 use crate::results::vtkhdf::Records;
 use crate::scene::{self, Scene};
 pub use conditions::RightHandSides;
-pub use discrete::{Discrete, discretise, discretise_by_cost};
+pub use discrete::{Discrete, discretise, discretise_expecting};
 pub use sizes::{memory_estimate_mb, sizes};
 
 /// Why a scene has no discrete problem; the same on every rank.
@@ -121,15 +120,15 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
     newton::Start { u, held: fine.constraints.rows.iter().map(|row| held(row.kind)).collect() }
 }
 
-/// What the subdomains of a finer mesh are likely to cost, from where a solved scene yields. `None` if they are not known
-/// before the mesh is cut. Collective.
-pub fn expected_costs(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<u64>> {
+/// Which boxes of a finer mesh are likely to yield, from where a solved scene does; see [`discretise_expecting`]. `None` if
+/// the mesh is not cut into boxes. Collective.
+pub fn expected_yielding(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<Vec<bool>>> {
     let bodies = bodies::bricks(fine)?;
     let Cut::Bricks(cells) = discrete::cut(&fine.decomposition, &bodies) else { return None };
     let (coarse, solved) = coarse;
-    let boxes = Boxes::new(&bodies, cells);
     let material = |body: usize| &coarse.materials[body];
-    Some(cascade::costs(comm, (&coarse.bodies, &coarse.decomposition.subdomains, &solved.u), material, &boxes))
+    let coarse = (&coarse.bodies[..], &coarse.decomposition.subdomains[..], &solved.u);
+    Some(cascade::yielding(comm, coarse, material, (&bodies, cells)))
 }
 
 /// Solves a discretised scene, from rest or from a start; `report` is told what happens. Collective.

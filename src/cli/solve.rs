@@ -95,8 +95,8 @@ pub(super) struct Plan {
     pub source: Source,
     /// Levels to solve, coarsest first; the last is that of the scene.
     pub levels: Vec<usize>,
-    /// What the subdomains of the first of them are expected to cost.
-    pub costs: Option<Vec<u64>>,
+    /// Which boxes of each body of the first of them are expected to yield.
+    pub yielding: Option<Vec<Vec<bool>>>,
     /// What the levels before took.
     pub rows: Vec<CascadeRow>,
 }
@@ -127,7 +127,7 @@ pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32,
     let scene = found.at_level(source.level, &source.sets)?;
     let mut levels = cascade.before(source.level, &scene);
     levels.push(source.level);
-    let plan = Plan { source, levels, costs: None, rows: Vec::new() };
+    let plan = Plan { source, levels, yielding: None, rows: Vec::new() };
     carry_out(plan, &found, &scene, None, Conduct { timer, out, progress, checkpoints, signals }, comm)
 }
 
@@ -165,7 +165,7 @@ pub(super) fn carry_out(
             Err(_) => Ok(None),
         };
         plan.levels.remove(0);
-        plan.costs = None;
+        plan.yielding = None;
         let (discrete, solved) = match solved {
             Ok(Some(solved)) => solved,
             // A level that is too coarse for the scene is left out.
@@ -234,10 +234,10 @@ impl Run<'_> {
     ) -> Result<(study::Discrete, study::Solved), Failure> {
         let Self { comm, timer, keeper, .. } = *self;
         if let Some((coarse, solved)) = &coarser {
-            plan.costs = timer.time("interpolation", || study::expected_costs(comm, (coarse, solved), scene));
+            plan.yielding = timer.time("interpolation", || study::expected_yielding(comm, (coarse, solved), scene));
         }
-        let costs = plan.costs.as_deref();
-        let discrete = timer.time("discretisation", || study::discretise_by_cost(scene, costs, comm))?;
+        let yielding = plan.yielding.as_deref();
+        let discrete = timer.time("discretisation", || study::discretise_expecting(scene, yielding, comm))?;
         let sizes = study::sizes(&discrete, comm);
         let (name, level) = (plan.source.scene.clone(), plan.levels[0]);
         monitor.event(&Event::Sizes { scene: name, level, ranks: comm.size(), sizes });

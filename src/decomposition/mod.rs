@@ -191,12 +191,12 @@ pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape)>) -> Vec<Bod
         .collect()
 }
 
-/// Tears the bodies. Boxes of [`Cut::Bricks`] are spread over the ranks by their `costs` if given, otherwise every rank
-/// gets as many subdomains. Collective.
-pub fn tear(bodies: &Bodies, cut: Cut, costs: Option<&[u64]>, comm: &dyn Comm) -> Decomposition {
+/// Tears the bodies. `yielding` says which boxes of [`Cut::Bricks`] of each body, x fastest, are expected to yield: every
+/// rank gets its part of them. Collective.
+pub fn tear(bodies: &Bodies, cut: Cut, yielding: Option<&[Vec<bool>]>, comm: &dyn Comm) -> Decomposition {
     let (shares, subdomains) = match cut {
         Cut::Bricks(cells) => {
-            let (shares, lists) = bricks::own_elements(bodies.bodies, cells, costs, comm);
+            let (shares, lists) = bricks::own_elements(bodies.bodies, cells, yielding, comm);
             let ids = shares.begin(comm.rank())..;
             (shares, ids.zip(lists).map(|(id, (body, list))| Subdomain::of_brick(id, bodies, body, &list)).collect())
         }

@@ -236,3 +236,37 @@ fn contact_surfaces_stay_on_fewer_subdomains() {
     };
     assert!(touching(&[0]) < touching(&[]), "{} instead of {}", touching(&[0]), touching(&[]));
 }
+
+#[test]
+fn boxes_that_yield_are_spread_over_the_ranks() {
+    let brick = |cells| Brick { origin: [0.0; 3], size: [1.0; 3], cells };
+    let shapes = [[8, 4, 6], [4, 4, 4]].map(|cells| (Kind::Tet4, Shape::Brick(brick(cells))));
+    let bodies = number_bodies(shapes);
+    // The upper half of the first body, and a corner of the other.
+    let upper: Vec<bool> = (0..24).map(|k| k >= 12).collect();
+    let corner: Vec<bool> = (0..8).map(|k| k < 3).collect();
+    let yielding = [upper, corner];
+    let cut = |expected: Option<&[Vec<bool>]>, ranks: usize| {
+        threads::run(ranks, |comm| {
+            let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
+            let own = tear(&torn, Cut::Bricks([2, 2, 2]), expected, comm).subdomains;
+            own.iter().map(|s| (s.body, s.nodes.clone())).collect::<Vec<_>>()
+        })
+    };
+    let plain: Vec<_> = cut(None, 1).concat();
+    // Without expectations boxes come in the order of their bodies, x fastest.
+    let kind = |subdomain: &(usize, Vec<u64>)| {
+        let before = plain.iter().take_while(|&other| other != subdomain).filter(|s| s.0 == subdomain.0).count();
+        (subdomain.0, yielding[subdomain.0][before])
+    };
+    for ranks in RANKS {
+        let parts = cut(Some(&yielding), ranks);
+        assert_eq!(parts.concat(), cut(Some(&yielding), 1).concat(), "numbers do not depend on the ranks");
+        assert_eq!(BTreeSet::from_iter(parts.concat()), BTreeSet::from_iter(plain.clone()));
+        for wanted in [(0, false), (0, true), (1, false), (1, true)] {
+            let counts: Vec<usize> = parts.iter().map(|own| own.iter().filter(|s| kind(s) == wanted).count()).collect();
+            let total: usize = counts.iter().sum();
+            assert!(counts.iter().all(|&n| (n * ranks).abs_diff(total) <= 2 * ranks), "{wanted:?}: {counts:?}");
+        }
+    }
+}

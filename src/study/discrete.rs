@@ -52,14 +52,18 @@ pub struct Discrete {
 /// # Errors
 /// If contacts cannot be paired or supports contradict each other.
 pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, StudyError> {
-    discretise_by_cost(scene, None, comm)
+    discretise_expecting(scene, None, comm)
 }
 
-/// As [`discretise`], but spreads the subdomains over the ranks by their costs.
+/// As [`discretise`], but spreads the subdomains that are expected to yield (see [`decomposition::tear`]) over the ranks.
 ///
 /// # Errors
 /// As there.
-pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm) -> Result<Discrete, StudyError> {
+pub fn discretise_expecting(
+    scene: &Scene,
+    yielding: Option<&[Vec<bool>]>,
+    comm: &dyn Comm,
+) -> Result<Discrete, StudyError> {
     let Meshes { bodies, solids, warnings } = Meshes::new(scene, comm)?;
     let materials = scene.body.values().map(|b| material(&scene.material[&b.material])).collect();
     let number =
@@ -79,7 +83,7 @@ pub fn discretise_by_cost(scene: &Scene, costs: Option<&[u64]>, comm: &dyn Comm)
     let touching: Vec<usize> = scene.contact.values().flat_map(scene::Contact::surfaces).map(index).collect();
 
     let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &surfaces, contact: &touching };
-    let decomposition = decomposition::tear(&torn, cut(&scene.decomposition, &bodies), costs, comm);
+    let decomposition = decomposition::tear(&torn, cut(&scene.decomposition, &bodies), yielding, comm);
     drop(solids);
     let reading_mb = reading_mb(&bodies, comm);
 
