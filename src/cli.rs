@@ -21,7 +21,7 @@ pub use self::resume::{Resume, resume};
 pub use self::solve::{Cascade, Solve, solve};
 pub use self::verify::{Verify, verify};
 use crate::bodies::MeshError;
-use crate::comm::{Comm, Shares, ordered_sum};
+use crate::comm::{Comm, Shares, maximum, ordered_sum};
 use crate::monitor::timing::peak_rss_mb;
 use crate::results::OutputError;
 use crate::results::agree::root_texts;
@@ -77,6 +77,17 @@ pub struct Source {
     /// Write a summary of the run as JSON.
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
+}
+
+/// What a run tells beside its log.
+#[derive(Debug, Args)]
+pub struct Insight {
+    /// Write what every rank did when into this directory, one file a rank, for Chrome's trace viewer or Perfetto.
+    #[arg(long, value_name = "DIR")]
+    trace: Option<PathBuf>,
+    /// Write the events of the run as JSON, one object a line.
+    #[arg(long, value_name = "FILE")]
+    log_json: Option<PathBuf>,
 }
 
 /// Why a command gave up; the same on every rank.
@@ -211,4 +222,5 @@ fn describe_run(summary: &mut Summary, source: &Source, comm: &dyn Comm) {
     summary.ranks = comm.size();
     let mine = peak_rss_mb().unwrap_or(f64::NAN);
     summary.peak_rss_mb = Some(ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0]);
+    summary.peak_rss_mb_max = Some(maximum(comm, &[mine])[0]);
 }

@@ -50,10 +50,10 @@ DEFAULT = "active-set/dirichlet/cascade"
 """What the program does by itself."""
 
 PROFILE = """\
-`{variant}` at level {level} on {ranks} ranks, the run of median time{coarser}. Each phase is on its slowest rank; waiting for
-other ranks counts as the phase that waits, and again as messages at the end. Rates are of the work that must be done:
-additions and multiplications of the factors, and bytes of the factors that each application reads, shared ones once for
-all that are solved together. They stand against the limits of as many cores as there are ranks, taken one at a time
+`{variant}` at level {level} on {ranks} ranks, the run of median time{coarser}. Each phase is on its slowest rank, without
+messages; those stand at the end, waiting for other ranks included. Outside messages the busiest rank spends {imbalance:.2f}
+times as long as the least busy one. Rates are of the work that must be done: additions and multiplications of the factors,
+and bytes of the factors that each application reads, shared ones once for all that are solved together. They stand against the limits of as many cores as there are ranks, taken one at a time
 ([kernels.md](kernels.md)): the product of matrices in single precision, and reading memory in order. A solve for eight at
 once does eight times the work on what it reads, so `dual operator` and `preconditioner` lie between both limits.
 
@@ -319,9 +319,10 @@ def accuracy(levels, references):
 
 def profile(levels):
     """Where the time goes: phases of the default at the highest level, each against the machine's limits."""
-    measured_ones = {n: groups for n, groups in levels.levels.items() if any(g.timed for g in groups.values())}
-    level = max(measured_ones)
-    candidates = {v: g for v, g in measured_ones[level].items() if g.timed}
+    # Earlier runs counted messages as part of the phases.
+    apart = {n: {v: g for v, g in groups.items() if g.timed and "imbalance" in g.first} for n, groups in levels.levels.items()}
+    level = max(n for n, groups in apart.items() if groups)
+    candidates = apart[level]
     variant, group = DEFAULT, candidates.get(DEFAULT)
     if group is None:
         variant, group = min(candidates.items(), key=lambda item: item[1].median())
@@ -338,15 +339,16 @@ def profile(levels):
 
     phases = sorted(summary["time"].items(), key=lambda phase: -phase[1])
     rows = [[name, f"{s:.3g}", f"{100 * s / total:.1f} %", against(name, s)] for name, s in phases]
-    # Ranks are slow in different phases, so that all together may exceed the total.
-    other = max(0.0, total - sum(seconds for _, seconds in phases))
-    rows += [["other", f"{other:.3g}", f"{100 * other / total:.1f} %", ""], ["total", f"{total:.3g}", "", ""]]
-    for kind, row in summary.get("communication", {}).items():
+    messages = summary["communication"]
+    for kind, row in messages.items():
         volume = f"{row['megabytes']:.3g} MiB in {thousands(row['calls'])} calls"
-        rows.append([f"of it {kind}", f"{row['seconds']:.3g}", f"{100 * row['seconds'] / total:.1f} %", volume])
-    text = PROFILE.format(
-        variant=variant, level=level, ranks=ranks, coarser=", coarser levels included" if summary["cascade"] else ""
-    )
+        rows.append([kind, f"{row['seconds']:.3g}", f"{100 * row['seconds'] / total:.1f} %", volume])
+    # Ranks are slow in different phases, so that all together may exceed the total.
+    other = max(0.0, total - sum(seconds for _, seconds in phases) - sum(row["seconds"] for row in messages.values()))
+    rows += [["other", f"{other:.3g}", f"{100 * other / total:.1f} %", ""], ["total", f"{total:.3g}", "", ""]]
+    coarser = ", coarser levels included" if summary["cascade"] else ""
+    imbalance = summary["imbalance"] or 1.0
+    text = PROFILE.format(variant=variant, level=level, ranks=ranks, coarser=coarser, imbalance=imbalance)
     return text + table(["phase", "seconds", "share", "rate, all ranks"], rows)
 
 
@@ -377,7 +379,7 @@ def table_1(groups, study, paper):
 
 
 DEPENDS_ON_RANKS = {"ranks", "warnings", "time", "work", "communication", "time_total", "peak_rss_mb", "memory_estimate_mb"}
-DEPENDS_ON_RANKS |= {"newton", "cascade", "provenance"}
+DEPENDS_ON_RANKS |= {"newton", "cascade", "provenance", "imbalance", "peak_rss_mb_max"}
 
 
 def equality(variant, level, summaries):

@@ -8,9 +8,8 @@ use clap::Args;
 
 use super::keeper::{Checkpoints, Signals};
 use super::solve::{Conduct, Plan, carry_out, progress};
-use super::{Failure, find};
+use super::{Failure, Insight, find};
 use crate::comm::Comm;
-use crate::comm::metered::Metered;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
@@ -37,6 +36,8 @@ pub struct Resume {
     progress: Mode,
     #[command(flatten)]
     checkpoints: Checkpoints,
+    #[command(flatten)]
+    insight: Insight,
 }
 
 /// What a checkpoint is written by; others are not understood.
@@ -54,9 +55,8 @@ pub(super) fn labels(plan: &Plan, scene: &str) -> [(&'static str, String); 4] {
 /// # Errors
 /// If the scene has changed, the checkpoint is of no use, or files cannot be read or written.
 pub fn resume(arguments: Resume, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
-    let comm = &Metered::new(comm);
     let timer = Timer::start();
-    let Resume { file, out, summary, progress, checkpoints } = arguments;
+    let Resume { file, out, summary, progress, checkpoints, insight } = arguments;
     let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
     let (path, checkpoint) = open(comm, &file, &mut monitor)?;
     let unreadable = |reason: String| Failure::Input(format!("cannot go on from {}: {reason}", path.display()));
@@ -83,7 +83,14 @@ pub fn resume(arguments: Resume, comm: &dyn Comm, signals: Signals) -> Result<i3
     }
     plan.source.summary = summary.or(plan.source.summary);
     let out = out.unwrap_or_else(|| file.parent().map(Path::to_owned).unwrap_or_default());
-    carry_out(plan, &found, &scene, Some(checkpoint), Conduct { timer, out, progress, checkpoints, signals }, comm)
+    carry_out(
+        plan,
+        &found,
+        &scene,
+        Some(checkpoint),
+        Conduct { timer, out, progress, checkpoints, insight, signals },
+        comm,
+    )
 }
 
 /// Opens a checkpoint, or the one before.

@@ -8,13 +8,18 @@ use serde::{Deserialize, Serialize};
 
 use super::keeper::{Checkpoints, Keeper, Signals};
 use super::resume::{labels, unfit};
-use super::{Failure, Found, Source, describe_run, find, run_name, warnings};
+use super::{Failure, Found, Insight, Source, describe_run, find, run_name, warnings};
 use crate::comm::Comm;
-use crate::comm::metered::Metered;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
+use crate::monitor::json::JsonLines;
+use crate::monitor::metered::Metered;
 use crate::monitor::progress::Mode;
-use crate::monitor::timing::{Phase, PhaseTable, Timer};
+use crate::monitor::table::{Phase, PhaseTable};
+use crate::monitor::timing::Timer;
+use crate::monitor::trace;
+use crate::results::OutputError;
+use crate::results::agree::agree;
 use crate::results::checkpoint::{self, Checkpoint};
 use crate::results::replace;
 use crate::results::summary::{CascadeRow, CommunicationRow, Summary};
@@ -48,6 +53,8 @@ pub struct Solve {
     progress: Mode,
     #[command(flatten)]
     checkpoints: Checkpoints,
+    #[command(flatten)]
+    insight: Insight,
 }
 
 /// Tolerance of coarser levels: well below what halving the cells changes.
@@ -108,6 +115,7 @@ pub(super) struct Conduct {
     pub out: PathBuf,
     pub progress: Mode,
     pub checkpoints: Checkpoints,
+    pub insight: Insight,
     pub signals: Signals,
 }
 
@@ -116,9 +124,8 @@ pub(super) struct Conduct {
 /// # Errors
 /// If the scene is bad or files cannot be read or written.
 pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
-    let comm = &Metered::new(comm);
     let timer = Timer::start();
-    let Solve { mut source, out, qp, preconditioner, accuracy, cascade, progress, checkpoints } = arguments;
+    let Solve { mut source, out, qp, preconditioner, accuracy, cascade, progress, checkpoints, insight } = arguments;
     let shorthand = |key: &str, value: Option<String>| value.map(|v| format!("solver.{key}={v}"));
     source.sets.extend(shorthand("qp", qp));
     source.sets.extend(shorthand("preconditioner", preconditioner));
@@ -128,7 +135,7 @@ pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32,
     let mut levels = cascade.before(source.level, &scene);
     levels.push(source.level);
     let plan = Plan { source, levels, yielding: None, rows: Vec::new() };
-    carry_out(plan, &found, &scene, None, Conduct { timer, out, progress, checkpoints, signals }, comm)
+    carry_out(plan, &found, &scene, None, Conduct { timer, out, progress, checkpoints, insight, signals }, comm)
 }
 
 /// Solves level after level and writes results, from where a checkpoint of the first level stands if there is one. `found`
@@ -139,18 +146,29 @@ pub(super) fn carry_out(
     scene: &Scene,
     mut checkpoint: Option<Checkpoint>,
     conduct: Conduct,
-    comm: &Metered,
+    comm: &dyn Comm,
 ) -> Result<i32, Failure> {
-    let Conduct { timer, out, progress, checkpoints, signals } = conduct;
+    let Conduct { mut timer, out, progress, checkpoints, insight: Insight { trace, log_json }, signals } = conduct;
     let mut monitor = Monitor::of_rank(comm.rank(), progress);
+    if trace.is_some() {
+        timer.keep_spans();
+    }
+    let (timer, comm) = (&timer, &Metered::new(comm, &timer));
     let name = run_name(&plan.source);
     let result = out.join(format!("{name}.vtkhdf"));
     let summary_file = plan.source.summary.clone().unwrap_or_else(|| out.join(format!("{name}.json")));
-    for file in [&result, &summary_file] {
+    let traced = trace.as_deref().map(|directory| trace::file(directory, 0));
+    for file in [&result, &summary_file].into_iter().chain(&traced) {
         replace::probe(comm, file).map_err(Failure::Place)?;
     }
-    let keeper = Keeper::new(comm, &timer, checkpoints, signals, out.join(format!("{name}.checkpoint.h5")));
-    let run = Run { comm, timer: &timer, keeper: &keeper, scene: scene.to_toml() };
+    if let Some(file) = &log_json {
+        let refused = |reason: String| Failure::Place(OutputError::Write { path: file.clone(), reason });
+        let log = if comm.rank() == 0 { JsonLines::create(file).map(Some) } else { Ok(None) };
+        let log = agree(comm, "creating the log", log).map_err(refused)?;
+        log.into_iter().for_each(|log| monitor.add(log));
+    }
+    let keeper = Keeper::new(comm, timer, checkpoints, signals, out.join(format!("{name}.checkpoint.h5")));
+    let run = Run { comm, timer, keeper: &keeper, scene: scene.to_toml() };
 
     let mut coarser: Option<(study::Discrete, study::Solved)> = None;
     while let [level, _, ..] = plan.levels[..] {
@@ -186,18 +204,22 @@ pub(super) fn carry_out(
     let (discrete, mut solved) = run.level(&mut plan, scene, coarser, checkpoint, &mut monitor)?;
     timer.time("output", || vtkhdf::write(comm, &result, &solved.piece, &solved.records))?;
 
-    let table = PhaseTable::gather(comm, &timer, comm.traffic());
+    let table = PhaseTable::gather(comm, timer);
     let summary = &mut solved.summary;
     describe_run(summary, &plan.source, comm);
     summary.warnings = warnings(scene, &discrete, comm);
     summary.mesh_reading_mb = discrete.reading_mb;
     summary.provenance = solved.records.provenance.into_iter().filter(|(name, _)| name != "scene").collect();
     summary.cascade = plan.rows;
+    summary.imbalance = table.busy.ratio();
     summary.time = table.max_seconds();
     summary.work = table.work();
     summary.communication = communication(&table);
     summary.time_total = Some(table.total_seconds);
     summary.write(comm, &summary_file)?;
+    if let Some(directory) = &trace {
+        trace::write(comm, directory, timer)?;
+    }
 
     let converged = summary.converged == Some(true);
     monitor.event(&Event::Phases(table.clone()));
@@ -214,7 +236,7 @@ pub(super) fn carry_out(
 
 /// What all levels of a run share.
 struct Run<'a> {
-    comm: &'a Metered<'a>,
+    comm: &'a dyn Comm,
     timer: &'a Timer,
     keeper: &'a Keeper<'a>,
     /// The scene at its level.
@@ -277,7 +299,7 @@ impl Run<'_> {
 fn communication(table: &PhaseTable) -> BTreeMap<String, CommunicationRow> {
     let row = |kind: &Phase| CommunicationRow {
         calls: kind.calls,
-        seconds: kind.max_seconds,
+        seconds: kind.seconds.max,
         megabytes: kind.work.bytes / f64::from(1 << 20),
     };
     table.communication.iter().map(|kind| (kind.name.clone(), row(kind))).collect()

@@ -1,14 +1,13 @@
 //! Communication between the ranks of one run: the only room that names MPI.
 //!
 //! Numerical code sees the trait [`Comm`] and nothing else. Three implementations: [`solo::Solo`] (one rank, no
-//! launcher), [`threads`] (n ranks as threads of one process, for tests) and [`world::World`] (MPI). [`metered::Metered`]
-//! counts what goes through any of them.
+//! launcher), [`threads`] (n ranks as threads of one process, for tests) and [`world::World`] (MPI).
+//! [`Metered`](crate::monitor::metered::Metered) counts what goes through any of them.
 //!
 //! Results must be *bitwise* the same for every number of ranks. So no sum is ever left to the communication layer:
 //! ranks hand over one partial value per subdomain, and [`ordered_sum`] adds them in subdomain order on rank 0.
 //! It does not know subdomains beyond that: ranks own consecutive blocks of them, so rank order is subdomain order.
 
-pub mod metered;
 pub mod solo;
 pub mod threads;
 pub mod world;

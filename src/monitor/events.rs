@@ -1,10 +1,13 @@
 //! The events of a run.
 
-use super::timing::PhaseTable;
+use serde::Serialize;
+
+use super::table::PhaseTable;
 use crate::results::summary::{ContactRow, Errors, NewtonRow, Residuals, Sizes};
 
 /// Something that happened and is worth telling; numbers are those of all ranks together.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
+#[serde(tag = "event", content = "data", rename_all = "snake_case")]
 pub enum Event {
     /// The problem is set up.
     Sizes {

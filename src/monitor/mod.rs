@@ -1,13 +1,18 @@
 //! What a run tells while it runs: typed events on one side, sinks that show them on the other.
 //!
 //! The stages send [`events::Event`]s to a [`Monitor`]; only rank 0's shows anything. Log lines go through `tracing`, so
-//! the program decides where they end up; [`timing`] measures phases and compares them over the ranks.
+//! the program decides where they end up. [`timing`] measures phases and messages, [`table`] compares them over the ranks,
+//! [`trace`] keeps every call.
 //! Nothing here is read back by the numerics.
 
 pub mod events;
+pub mod json;
+pub mod metered;
 pub mod plain;
 pub mod progress;
+pub mod table;
 pub mod timing;
+pub mod trace;
 
 use events::{Event, Sink};
 use plain::Plain;
@@ -27,6 +32,11 @@ impl Monitor {
         }
         // Progress comes first: it clears its line before the log continues.
         Self { sinks: vec![Box::new(Progress::on_stderr(mode)), Box::new(Plain::default())] }
+    }
+
+    /// Another sink, told last.
+    pub fn add(&mut self, sink: impl Sink + 'static) {
+        self.sinks.push(Box::new(sink));
     }
 }
 

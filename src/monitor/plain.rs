@@ -4,7 +4,7 @@
 //! [`super::progress`].
 
 use super::events::{Event, Sink};
-use super::timing::PhaseTable;
+use super::table::{Phase, PhaseTable, Spread};
 use crate::results::summary::{ContactRow, Errors, NewtonRow, Residuals, Sizes};
 
 /// Writes log lines.
@@ -101,25 +101,42 @@ fn newton_line(row: &NewtonRow) -> String {
 }
 
 fn phase_lines(table: &PhaseTable) -> Vec<String> {
-    let header = format!(
-        "{:<29} {:>7} {:>9} {:>7} {:>5} {:>8} {:>8}",
-        "phase", "calls", "max s", "max/min", "%", "GF/s", "GB/s"
-    );
-    let row = |phase: &super::timing::Phase| {
-        let ratio = phase.ratio().map_or("-".into(), |ratio| format!("{ratio:.2}"));
-        let percent = 100.0 * phase.max_seconds / table.total_seconds;
-        let rate = |work: f64| match work / phase.max_seconds / 1e9 {
+    let line = |name: &str, calls: String, spread: Spread, rates: [String; 2]| {
+        let ratio = spread.ratio().map_or("-".into(), |ratio| format!("{ratio:.2}"));
+        let percent = 100.0 * spread.max / table.total_seconds;
+        let [left, right] = rates;
+        let line = format!("{name:<29} {calls:>7} {:>9.3} {ratio:>7} {percent:>5.1} {left:>8} {right:>8}", spread.max);
+        line.trim_end().to_owned()
+    };
+    let phase = |phase: &Phase| {
+        let rates = [phase.work.flops, phase.work.bytes].map(|work| match work / phase.seconds.max / 1e9 {
             rate if work > 0.0 => format!("{rate:.2}"),
             _ => String::new(),
-        };
-        let (name, calls, seconds) = (&phase.name, phase.calls, phase.max_seconds);
-        let line = format!("{name:<29} {calls:>7} {seconds:>9.3} {ratio:>7} {percent:>5.1}");
-        format!("{line} {:>8} {:>8}", rate(phase.work.flops), rate(phase.work.bytes)).trim_end().to_owned()
+        });
+        line(&phase.name, phase.calls.to_string(), phase.seconds, rates)
     };
-    let total = format!("{:<29} {:>7} {:>9.3} {:>7} {:>5.1}", "total", "", table.total_seconds, "", 100.0);
-    let messages = (!table.communication.is_empty()).then(|| "of it in messages, with waiting for other ranks".into());
-    let (phases, communication) = (table.phases.iter().map(row), table.communication.iter().map(row));
-    [header].into_iter().chain(phases).chain([total]).chain(messages).chain(communication).collect()
+    let messages = |kind: &Phase| {
+        let volume = format!("{:.2} MiB", kind.work.bytes / f64::from(1 << 20));
+        line(&kind.name, kind.calls.to_string(), kind.seconds, [String::new(), volume])
+    };
+    let (total, memory) = (table.total_seconds, table.memory_mb);
+    let head = [["phase", "messages, with waiting"], ["GF/s", ""], ["GB/s", ""]];
+    let header = |of: usize| {
+        let [name, left, right] = head.map(|names| names[of]);
+        format!("{name:<29} {:>7} {:>9} {:>7} {:>5} {left:>8} {right:>8}", "calls", "max s", "max/min", "%")
+    };
+    let mut lines = vec![header(0)];
+    lines.extend(table.phases.iter().map(phase));
+    if !table.communication.is_empty() {
+        lines.push(header(1).trim_end().to_owned());
+        lines.extend(table.communication.iter().map(messages));
+    }
+    lines.push(line("all but messages", String::new(), table.busy, Default::default()));
+    lines.push(line("total", String::new(), Spread { max: total, min: total }, Default::default()));
+    lines.extend(
+        memory.ratio().map(|ratio| format!("{:<29} {:>7} {:>9.0} {ratio:>7.2}", "memory of a rank", "MiB", memory.max)),
+    );
+    lines
 }
 
 fn residual_lines(residuals: &Residuals) -> Vec<String> {

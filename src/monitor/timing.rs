@@ -1,28 +1,74 @@
-//! How long the phases of a run take, how evenly over the ranks, and how much work they do; how much memory a rank took.
+//! How long the phases of a run take on one rank, how long its messages, and how much work is done.
 //!
-//! Wall time. Phases do not nest, so that their sum is at most the total; communication is part of them.
+//! Wall time. Phases do not nest and leave out the messages inside them, so that all of them together and all messages
+//! together make up the total, but for what belongs to no phase.
 
-use std::cell::RefCell;
-use std::collections::BTreeMap;
-use std::time::Instant;
+use std::cell::{Cell, RefCell};
+use std::time::{Duration, Instant, SystemTime};
 
-use crate::comm::metered::{KINDS, Traffic};
-use crate::comm::{Comm, Shares, all_gather_text, maximum, ordered_sum};
 use crate::results::summary::Work;
 
-/// Collects the seconds that one rank spends in named phases.
+/// Collects the seconds that one rank spends in named phases and in messages.
 #[derive(Clone, Debug)]
 pub struct Timer {
     started: Instant,
+    /// When that was by the clock on the wall, which ranks have in common.
+    at: SystemTime,
     phases: RefCell<Vec<(&'static str, Spent)>>,
+    traffic: Cell<[Traffic; 3]>,
+    /// Every single call, if they are to be kept.
+    spans: Option<RefCell<Vec<Span>>>,
 }
 
 /// What one rank spent in a phase.
 #[derive(Clone, Copy, Debug, Default)]
-struct Spent {
-    calls: u64,
-    seconds: f64,
-    work: Work,
+pub(super) struct Spent {
+    pub calls: u64,
+    pub seconds: f64,
+    pub work: Work,
+}
+
+/// Kinds of messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Messages {
+    /// Between neighbouring ranks.
+    Exchange,
+    /// Of all ranks.
+    Collective,
+    /// Of any lengths, while the problem is set up.
+    SetUp,
+}
+
+impl Messages {
+    /// All kinds.
+    pub const ALL: [Self; 3] = [Self::Exchange, Self::Collective, Self::SetUp];
+
+    /// What the log calls them.
+    pub fn name(self) -> &'static str {
+        ["neighbour exchange", "collectives", "set-up messages"][self as usize]
+    }
+}
+
+/// Messages of one kind on one rank.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Traffic {
+    /// Calls.
+    pub calls: u64,
+    /// Time inside them: waiting for slower ranks and the transfer itself, which cannot be told apart.
+    pub seconds: f64,
+    /// Bytes that this rank handed in.
+    pub bytes: u64,
+}
+
+/// One call of a phase, messages inside it included, or of a message.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Of the phase or the kind of messages.
+    pub name: &'static str,
+    /// Since the timer was started.
+    pub begin: Duration,
+    /// How long it took.
+    pub length: Duration,
 }
 
 impl Default for Timer {
@@ -34,14 +80,22 @@ impl Default for Timer {
 impl Timer {
     /// Starts the clock of the whole run.
     pub fn start() -> Self {
-        Self { started: Instant::now(), phases: RefCell::default() }
+        let (started, at) = (Instant::now(), SystemTime::now());
+        Self { started, at, phases: RefCell::default(), traffic: Cell::default(), spans: None }
     }
 
-    /// Runs `work` and counts its time as one call of a phase.
+    /// Keeps every single call from now on.
+    pub fn keep_spans(&mut self) {
+        self.spans = Some(RefCell::default());
+    }
+
+    /// Runs `work` and counts its time, without that of messages inside it, as one call of a phase.
     pub fn time<T>(&self, phase: &'static str, work: impl FnOnce() -> T) -> T {
-        let begin = Instant::now();
+        let (begin, messages) = (Instant::now(), self.message_seconds());
         let result = work();
-        self.add(phase, begin.elapsed().as_secs_f64());
+        let length = begin.elapsed();
+        self.keep(phase, begin, length);
+        self.add(phase, length.as_secs_f64() - (self.message_seconds() - messages));
         result
     }
 
@@ -61,6 +115,52 @@ impl Timer {
         });
     }
 
+    /// Sends and receives messages of one kind, which hand in so many bytes here.
+    pub fn messages<T>(&self, kind: Messages, bytes: u64, call: impl FnOnce() -> T) -> T {
+        let begin = Instant::now();
+        let result = call();
+        let length = begin.elapsed();
+        self.keep(kind.name(), begin, length);
+        let mut traffic = self.traffic.get();
+        let of_kind = &mut traffic[kind as usize];
+        of_kind.calls += 1;
+        of_kind.seconds += length.as_secs_f64();
+        of_kind.bytes += bytes;
+        self.traffic.set(traffic);
+        result
+    }
+
+    /// Messages so far.
+    pub fn traffic(&self, kind: Messages) -> Traffic {
+        self.traffic.get()[kind as usize]
+    }
+
+    /// Seconds since the start.
+    pub fn total_seconds(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// When the clock was started.
+    pub fn started(&self) -> SystemTime {
+        self.at
+    }
+
+    /// The calls that were kept.
+    pub fn spans(&self) -> Vec<Span> {
+        self.spans.as_ref().map(|spans| spans.borrow().clone()).unwrap_or_default()
+    }
+
+    /// The phases in order of first use.
+    pub(super) fn names(&self) -> Vec<&'static str> {
+        self.phases.borrow().iter().map(|&(name, _)| name).collect()
+    }
+
+    /// What was spent in a phase; nothing if it never ran here.
+    pub(super) fn spent(&self, phase: &str) -> Spent {
+        let phases = self.phases.borrow();
+        phases.iter().find(|(name, _)| *name == phase).map(|(_, spent)| *spent).unwrap_or_default()
+    }
+
     fn book(&self, phase: &'static str, add: impl FnOnce(&mut Spent)) {
         let mut phases = self.phases.borrow_mut();
         let at = phases.iter().position(|(name, _)| *name == phase).unwrap_or_else(|| {
@@ -70,101 +170,14 @@ impl Timer {
         add(&mut phases[at].1);
     }
 
-    /// Seconds since the start.
-    pub fn total_seconds(&self) -> f64 {
-        self.started.elapsed().as_secs_f64()
-    }
-
-    /// What was spent in a phase; nothing if it never ran here.
-    fn spent(&self, phase: &str) -> Spent {
-        let phases = self.phases.borrow();
-        phases.iter().find(|(name, _)| *name == phase).map(|(_, spent)| *spent).unwrap_or_default()
-    }
-}
-
-/// The phases of all ranks.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhaseTable {
-    /// In order of first use: rank 0's, then what only others have.
-    pub phases: Vec<Phase>,
-    /// Messages of each kind; their seconds are part of the phases'. None of a kind that was not used.
-    pub communication: Vec<Phase>,
-    /// Wall time of the slowest rank since its timer was started.
-    pub total_seconds: f64,
-}
-
-/// One phase over all ranks.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Phase {
-    /// Its name.
-    pub name: String,
-    /// Calls on the rank that called it most.
-    pub calls: u64,
-    /// Seconds on the slowest rank.
-    pub max_seconds: f64,
-    /// Seconds on the fastest rank.
-    pub min_seconds: f64,
-    /// Of all ranks together. Of messages: bytes handed in.
-    pub work: Work,
-}
-
-impl Phase {
-    /// Slowest over fastest rank; `None` if some rank spent no time in it.
-    pub fn ratio(&self) -> Option<f64> {
-        (self.min_seconds > 0.0).then(|| self.max_seconds / self.min_seconds)
-    }
-}
-
-impl PhaseTable {
-    /// Compares the timers and messages of all ranks. Collective.
-    pub fn gather(comm: &dyn Comm, timer: &Timer, traffic: [Traffic; 3]) -> Self {
-        let mine: Vec<&str> = timer.phases.borrow().iter().map(|&(name, ..)| name).collect();
-        let mut names: Vec<String> = Vec::new();
-        for list in all_gather_text(comm, &mine.join("\n")) {
-            for name in list.lines() {
-                if !names.iter().any(|known| known == name) {
-                    names.push(name.to_owned());
-                }
-            }
+    fn keep(&self, name: &'static str, begin: Instant, length: Duration) {
+        if let Some(spans) = &self.spans {
+            spans.borrow_mut().push(Span { name, begin: begin.duration_since(self.started), length });
         }
-        let messages = traffic.map(|Traffic { calls, seconds, bytes }| {
-            let work = Work { flops: 0.0, bytes: bytes as f64 };
-            Spent { calls, seconds, work }
-        });
-        let spent: Vec<Spent> = names.iter().map(|name| timer.spent(name)).chain(messages).collect();
-        // One collective for all: the smallest is the largest of the negatives.
-        let mut values = vec![timer.total_seconds()];
-        values.extend(spent.iter().flat_map(|s| [s.calls as f64, s.seconds, -s.seconds]));
-        let largest = maximum(comm, &values);
-        let work: Vec<f64> = spent.iter().flat_map(|s| [s.work.flops, s.work.bytes]).collect();
-        let work = ordered_sum(comm, &Shares(vec![1; comm.size()]), &work, work.len());
-        let count = names.len();
-        let names = names.into_iter().chain(KINDS.map(str::to_owned));
-        let rows = largest[1..].chunks_exact(3).zip(work.chunks_exact(2));
-        let mut phases: Vec<Phase> = names
-            .zip(rows)
-            .map(|(name, (row, work))| Phase {
-                name,
-                calls: row[0] as u64,
-                max_seconds: row[1],
-                min_seconds: -row[2],
-                work: Work { flops: work[0], bytes: work[1] },
-            })
-            .collect();
-        let mut communication = phases.split_off(count);
-        communication.retain(|kind| kind.calls > 0);
-        Self { phases, communication, total_seconds: largest[0] }
     }
 
-    /// Seconds of each phase on the slowest rank, by name.
-    pub fn max_seconds(&self) -> BTreeMap<String, f64> {
-        self.phases.iter().map(|phase| (phase.name.clone(), phase.max_seconds)).collect()
-    }
-
-    /// Work of each phase where it is known, by name.
-    pub fn work(&self) -> BTreeMap<String, Work> {
-        let known = self.phases.iter().filter(|phase| phase.work != Work::default());
-        known.map(|phase| (phase.name.clone(), phase.work)).collect()
+    fn message_seconds(&self) -> f64 {
+        self.traffic.get().iter().map(|traffic| traffic.seconds).sum()
     }
 }
 
@@ -178,34 +191,26 @@ pub fn peak_rss_mb() -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::thread::sleep;
+
     use super::*;
-    use crate::comm::threads;
 
     #[test]
-    fn phases_are_compared_over_the_ranks() {
-        let tables = threads::run(3, |comm| {
-            let timer = Timer::start();
-            timer.add("factorisation", 1.0 + comm.rank() as f64);
-            timer.add("factorisation", 0.5);
-            if comm.rank() == 1 {
-                timer.add("contact", 2.0);
-            }
-            assert_eq!(timer.time("assembly", || 7), 7);
-            timer.count("assembly", 10.0, comm.rank() as f64);
-            let sent = Traffic { calls: 2, seconds: 0.5, bytes: 8 };
-            PhaseTable::gather(comm, &timer, [sent, Traffic::default(), Traffic::default()])
-        });
-        assert!(tables.iter().all(|t| *t == tables[0]));
-        let names: Vec<&str> = tables[0].phases.iter().map(|p| &p.name[..]).collect();
-        assert_eq!(names, ["factorisation", "assembly", "contact"]);
-        let [factorisation, assembly, contact] = &tables[0].phases[..] else { panic!("three phases") };
-        assert_eq!((factorisation.calls, factorisation.max_seconds, factorisation.min_seconds), (2, 3.5, 1.5));
-        assert_eq!((contact.calls, contact.max_seconds, contact.ratio()), (1, 2.0, None));
-        assert_eq!(tables[0].max_seconds()["factorisation"], 3.5);
-        assert_eq!(assembly.work, Work { flops: 30.0, bytes: 3.0 });
-        assert_eq!(tables[0].work().into_keys().collect::<Vec<_>>(), ["assembly"]);
-        let [exchange] = &tables[0].communication[..] else { panic!("one kind of messages") };
-        assert_eq!((exchange.calls, exchange.work.bytes, exchange.ratio()), (2, 24.0, Some(1.0)));
+    fn phases_leave_out_messages_and_calls_are_kept_on_request() {
+        let pause = Duration::from_millis(20);
+        let mut timer = Timer::start();
+        timer.keep_spans();
+        let answer =
+            timer.time("dual operator", || timer.messages(Messages::Exchange, 24, || [sleep(pause), ()].len()));
+        assert_eq!(answer, 2);
+        let Traffic { calls, seconds, bytes } = timer.traffic(Messages::Exchange);
+        assert!((calls, bytes) == (1, 24) && seconds >= pause.as_secs_f64());
+        let spent = timer.spent("dual operator");
+        assert!(spent.calls == 1 && spent.seconds < pause.as_secs_f64(), "{}", spent.seconds);
+        let [message, phase] = timer.spans()[..] else { panic!("two calls") };
+        assert_eq!((message.name, phase.name), ("neighbour exchange", "dual operator"));
+        assert!(phase.begin <= message.begin && message.begin + message.length <= phase.begin + phase.length);
+        assert!(Timer::start().spans().is_empty());
     }
 
     #[test]

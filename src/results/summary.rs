@@ -43,14 +43,18 @@ pub struct Summary {
     pub state: State,
     /// Wall time of the run in seconds.
     pub time_total: Option<f64>,
-    /// Seconds of each phase on the slowest rank.
+    /// Seconds outside messages, of the rank with most over that with least.
+    pub imbalance: Option<f64>,
+    /// Seconds of each phase on the slowest rank, without messages.
     pub time: BTreeMap<String, f64>,
     /// What phases do at least, all ranks together, where that is known.
     pub work: BTreeMap<String, Work>,
-    /// Messages by kind; their seconds are part of the phases'.
+    /// Messages by kind.
     pub communication: BTreeMap<String, CommunicationRow>,
     /// Sum over the ranks of their largest resident memory, in MiB.
     pub peak_rss_mb: Option<f64>,
+    /// That of the rank with the largest, in MiB.
+    pub peak_rss_mb_max: Option<f64>,
     /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
     pub mesh_reading_mb: Option<f64>,
     /// What a run would take, in MiB; from `check` only.

@@ -32,8 +32,18 @@ fn checkpoint(out: &Path) -> PathBuf {
 }
 
 /// Keys of the summary that belong to the run, not to its result.
-const OF_THE_RUN: [&str; 8] =
-    ["ranks", "time", "work", "communication", "time_total", "peak_rss_mb", "mesh_reading_mb", "provenance"];
+const OF_THE_RUN: [&str; 10] = [
+    "ranks",
+    "time",
+    "work",
+    "communication",
+    "time_total",
+    "imbalance",
+    "peak_rss_mb",
+    "peak_rss_mb_max",
+    "mesh_reading_mb",
+    "provenance",
+];
 
 /// Fields by name.
 type Bits = Vec<(String, Vec<u64>)>;

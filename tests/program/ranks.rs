@@ -14,13 +14,15 @@ const COARSE: [&str; 3] =
     ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
 
 /// Keys of the summary that may depend on the number of ranks or on the clock.
-const OF_THE_RUN: [&str; 9] = [
+const OF_THE_RUN: [&str; 11] = [
     "ranks",
     "time",
     "work",
     "communication",
     "time_total",
+    "imbalance",
     "peak_rss_mb",
+    "peak_rss_mb_max",
     "mesh_reading_mb",
     "warnings",
     "provenance",

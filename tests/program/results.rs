@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::common::fields::Fields;
-use crate::common::{Run, check, solve};
+use crate::common::{Run, check, solve, solve_with};
 use serde_json::Value;
 
 fn can_read(python: &Path) -> bool {
@@ -174,4 +174,29 @@ fn the_log_shows_every_newton_step_and_ends_with_the_verdict() {
     let table =
         run.stdout.lines().filter(|line| line.split_whitespace().next().is_some_and(|n| n.parse::<u64>().is_ok()));
     assert_eq!(table.count() as u64, steps, "{}", run.stdout);
+}
+
+#[test]
+fn programs_can_follow_a_run_and_what_its_ranks_do() {
+    let directory = tempfile::tempdir().unwrap();
+    let [trace, log] = ["trace", "logs/run.jsonl"].map(|name| directory.path().join(name));
+    let options = ["--trace", trace.to_str().unwrap(), "--log-json", log.to_str().unwrap()];
+    let run = solve_with(2, "patch", 1, &[], &options).converged();
+    let summary = run.summary();
+    let log = std::fs::read_to_string(log).unwrap();
+    let events: Vec<Value> = log.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let of = |name: &str| events.iter().filter(|event| event["event"] == name).collect::<Vec<_>>();
+    assert_eq!(of("newton_step").len(), summary["newton"].as_array().unwrap().len());
+    assert_eq!(of("sizes")[0]["data"]["sizes"]["subdomains"], summary["subdomains"]);
+    assert_eq!(events.last().unwrap()["data"]["converged"], true);
+    assert_eq!(of("phases")[0]["data"]["memory_mb"]["max"], summary["peak_rss_mb_max"]);
+    assert!(summary["imbalance"].as_f64().is_some_and(|ratio| ratio >= 1.0), "{}", summary["imbalance"]);
+    for rank in [0, 1] {
+        let text = std::fs::read_to_string(trace.join(format!("rank-{rank}.json"))).unwrap();
+        let trace: Value = serde_json::from_str(&text).unwrap();
+        let calls = trace["traceEvents"].as_array().unwrap();
+        for name in ["factorisation", "dual operator", "neighbour exchange", "collectives"] {
+            assert!(calls.iter().any(|call| call["name"] == name && call["pid"] == rank), "{name}");
+        }
+    }
 }
