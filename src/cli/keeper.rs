@@ -151,14 +151,17 @@ impl<'a> Keeper<'a> {
 
     fn due(&self) -> Due {
         let now = Instant::now();
-        if let Some(before) = self.asked.replace(Some(now)) {
+        let before = self.asked.replace(Some(now));
+        if let Some(before) = before {
             self.longest.set(self.longest.get().max(now - before));
         }
         let Checkpoints { checkpoint_every, time_limit } = self.options;
         let first = self.comm.rank() == 0;
         let passed = Duration::from_secs_f64(self.timer.total_seconds());
-        // Another step, and a checkpoint that takes as long as the longest yet, have to fit.
-        let is_late = time_limit.is_some_and(|limit| passed + self.longest.get() + 2 * self.writing.get() >= limit);
+        // Another step, and a checkpoint that takes as long as the longest yet, have to fit. One step is always done: who
+        // goes on again and again must not stand still.
+        let is_late = before.is_some()
+            && time_limit.is_some_and(|limit| passed + self.longest.get() + 2 * self.writing.get() >= limit);
         let is_old = checkpoint_every.is_some_and(|pause| self.written.get().elapsed() >= pause);
         let mine = [self.signals.seen() as f64, f64::from(first && is_late), f64::from(first && is_old)];
         match &maximum(self.comm, &mine)[..] {
@@ -225,6 +228,7 @@ mod tests {
         std::thread::sleep(Duration::from_millis(2));
         assert!(!often.pause(write) && written.get() > 0 && often.end().is_none());
         let late = keeper(options(3_600_000, 1));
+        assert!(!late.pause(write), "one step is done however little time there is");
         assert!(late.pause(write));
         assert_eq!(late.end(), Some(Ok("stopped before the time limit".into())));
         let failing = keeper(options(1, 3_600_000));

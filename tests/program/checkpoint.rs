@@ -148,7 +148,7 @@ fn a_cascade_stopped_by_the_clock_goes_on_to_the_same_bits() {
     let file = out.path().join("two-blocks-level2.checkpoint.h5");
     let limit = [&level[..], &["--time-limit", "0.001"]].concat();
     let mut end = run_disturbed(1, &solve(out.path(), &COARSE, &limit), |_| ());
-    // The clock stops it before its first step; later it may take one checkpoint's time after the other.
+    // The clock stops it after its first step; later it may take one checkpoint's time after the other.
     assert_eq!(end.code, 75, "{}{}", end.stdout, end.stderr);
     assert!(end.stderr.contains("stopped before the time limit; go on with: fetiplast resume"), "{}", end.stderr);
     for limit in ["0.1", "0.5", "1", "2"] {
