@@ -233,6 +233,8 @@ nested dissection promises (set-up with S^2, solve with S^4/3).
 def contents(folder, raw):
     """Every file this writes, with its text; nothing from runs that other work ran beside."""
     groups = [group for group in scaling.read(raw).values() if group.timed and group.first["work"].get("preconditioner")]
+    # Those of one size alone.
+    groups = [group for group in groups if not group.first["cascade"]]
     cells = max((group.records[0]["cells"] for group in groups), default=None)
     groups = [group for group in groups if group.records[0]["cells"] == cells]
     if len({group.first["subdomains"] for group in groups}) < 2:

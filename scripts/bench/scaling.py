@@ -17,7 +17,7 @@ HEAD = """\
 Written by `scripts/study write` from the newest commit's runs in [raw/scaling](raw/scaling), which `scripts/study run` made.
 Seconds are of the whole solve without starting and ending the processes, medians of the repetitions with smallest and
 largest; so is memory. Speed-up and efficiency are those of the medians, against the smallest number of ranks. Runs start
-from rest, without a cascade. Counts do not depend on the number of ranks. `cells` are those along the edge of a subdomain.
+from rest unless their options name a cascade. Counts do not depend on the number of ranks. `cells` are those along the edge of a subdomain.
 """
 
 BUSY = " (machine busy: only counts mean something)"
