@@ -12,7 +12,7 @@ use std::time::SystemTime;
 
 use thiserror::Error;
 
-use self::report::{contact_states, convergence, newton_row, place, step_row, summarise};
+use self::report::{contact_states, convergence, loss_of_accuracy, newton_row, place, step_row, summarise};
 use crate::bodies::{self, MeshError};
 use crate::cascade;
 use crate::comm::Comm;
@@ -224,7 +224,10 @@ pub fn solve_from(
         report.borrow_mut()(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });
     };
     let number = Cell::new(1);
-    let step = |record: &StepRecord| report.borrow_mut()(Event::NewtonStep(newton_row(number.get(), record)));
+    let step = |record: &StepRecord| {
+        report.borrow_mut()(Event::NewtonStep(newton_row(number.get(), record)));
+        loss_of_accuracy(record).into_iter().for_each(|text| report.borrow_mut()(Event::Warning(text)));
+    };
     let watch = Watch { timer, alive: &alive, step: &step };
     let mut piece = fields::mesh(subdomains, comm.rank());
     let fixed = piece.cell_data.len();
@@ -251,7 +254,8 @@ pub fn solve_from(
             place(scene, at).into_iter().for_each(|place| report.borrow_mut()(Event::Increment(place)));
         }
         Progress::Halved(at, outcome) => {
-            let (place, reason) = (place(scene, at).unwrap_or_default(), outcome.message().unwrap_or_default());
+            let place = place(scene, at).unwrap_or_else(|| "the whole load".into());
+            let reason = outcome.message().unwrap_or_default();
             report.borrow_mut()(Event::Warning(format!("{place}: {reason}; the increment is halved")));
         }
         Progress::Solution(at, solution) => {

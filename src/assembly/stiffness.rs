@@ -7,17 +7,18 @@ use crate::element::point::block;
 use crate::element::{Nodal, Point, by_kind};
 use crate::material::{History, Material};
 
-/// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed `history`.
+/// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed `history`, with a share
+/// of the `secant` stiffness ([`Material::stiffness`]).
 /// Returns the number of elements that yield.
 pub fn assemble(
     subdomain: &Subdomain,
     material: &Material,
     history: &[History],
-    u: &[f64],
+    (u, secant): (&[f64], f64),
     pattern: &Pattern,
     values: &mut [f64],
 ) -> usize {
-    by_kind!(subdomain.elements.kind(), assemble_of(subdomain, material, history, u, pattern, values))
+    by_kind!(subdomain.elements.kind(), assemble_of(subdomain, material, history, (u, secant), pattern, values))
 }
 
 fn assemble_of<const N: usize, const P: usize>(
@@ -25,7 +26,7 @@ fn assemble_of<const N: usize, const P: usize>(
     subdomain: &Subdomain,
     material: &Material,
     history: &[History],
-    u: &[f64],
+    (u, secant): (&[f64], f64),
     pattern: &Pattern,
     values: &mut [f64],
 ) -> usize {
@@ -41,7 +42,7 @@ fn assemble_of<const N: usize, const P: usize>(
             let strain = point.strain(&u);
             if material.respond(&strain, committed).plastic {
                 yields = true;
-                point.add_stiffness(&material.tangent(&strain, committed), &mut k);
+                point.add_stiffness(&material.stiffness(&strain, committed, secant), &mut k);
             } else {
                 point.add_stiffness(&elastic, &mut k);
             }

@@ -4,8 +4,7 @@
 
 use std::fmt;
 
-use super::coarse::MODES;
-use super::coarse::factor::Blocks;
+use super::coarse::{Blocks, MODES};
 use super::kernel::RigidModes;
 use crate::comm::{Comm, Shares};
 use crate::decomposition::Subdomain;

@@ -151,6 +151,13 @@ impl Material {
     /// The consistent tangent d stress / d strain of the same step: symmetric, at most C_e, at least
     /// (H + C) / (3 mu + H + C) C_e. In an elastic step it is [`Material::elastic_tangent`] to the last bit.
     pub fn tangent(&self, strain: &Voigt, committed: &History) -> Tangent {
+        self.stiffness(strain, committed, 0.0)
+    }
+
+    /// The tangent with a share, from 0 to 1, of what the secant stiffness has beyond it; at most C_e. The secant stiffness is
+    /// the tangent without N x N: xi is that times the deviator of the elastic strain, but for what is fixed in the step, and
+    /// Psi(a) <= Psi(b) + sigma(b) : (a - b) + 1/2 (a - b) : secant(b) : (a - b).
+    pub fn stiffness(&self, strain: &Voigt, committed: &History, secant: f64) -> Tangent {
         let trial = Trial::new(self, strain, committed);
         if !trial.plastic() {
             return self.elastic_tangent();
@@ -159,7 +166,7 @@ impl Material {
         let shear = mu * trial.shrink;
         // N x N = 3/2 xi x xi / q^2.
         let q = trial.equivalent;
-        let along = 9.0 * mu * mu * (trial.step / q - 1.0 / self.plastic_modulus()) / (q * q);
+        let along = (1.0 - secant) * 9.0 * mu * mu * (trial.step / q - 1.0 / self.plastic_modulus()) / (q * q);
         let mut c = [[0.0; 6]; 6];
         for i in 0..3 {
             c[i][..3].fill(bulk - 2.0 / 3.0 * shear);

@@ -177,6 +177,7 @@ mod tests {
             plastic_elements: 6813,
             active_contacts: 70,
             energy: -1.0,
+            local_residual: 1e-7,
             factorisations: 4,
             qp_iterations: 25,
             hessian_multiplications: 325,

@@ -6,9 +6,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Reduction of the gradient in the first step, and the least in later ones.
+/// Reduction of the gradient in the first step.
 const FIRST: f64 = 0.01;
-const LOOSEST: f64 = 0.03;
+/// The least reduction in later steps.
+pub const LOOSEST: f64 = 0.03;
 /// The most that is asked for: quadratic convergence gains nothing beyond, and factors in single precision can do it.
 pub const TIGHTEST: f64 = 1e-4;
 /// Factor on the squared decrease of the residual.

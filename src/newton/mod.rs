@@ -1,7 +1,7 @@
 //! Semismooth Newton for `min J(v) = Psi(v) - f'v` over the admissible displacements (paper, section 3).
 //!
 //! `J` is convex and every iterate is made feasible, so the step of the quadratic model is a descent direction and the
-//! method, damped by `J`, converges from anywhere. [`step`] is the only place where FETI and the QP solvers meet.
+//! method, damped by `J`, converges from anywhere; where it is damped much, [`secant`] helps. [`step`] is the only place where FETI and the QP solvers meet.
 
 pub mod basis;
 pub mod certificate;
@@ -16,7 +16,9 @@ pub mod motion;
 pub mod problem;
 pub mod program;
 pub mod recover;
+pub mod refine;
 pub mod residuals;
+pub mod secant;
 pub mod step;
 
 pub use certificate::Certificate;
@@ -109,6 +111,8 @@ pub struct StepRecord {
     pub active_contacts: usize,
     /// What the QP solver did.
     pub statistics: qp::Statistics,
+    /// Residual of the subdomains' problems that rounding leaves, relative to their forces.
+    pub local_residual: f64,
     /// Applications of F, those around the quadratic program included.
     pub applications: usize,
     /// Subdomains with a new factor, over all ranks.
@@ -217,6 +221,7 @@ pub fn solve(
             lambda = solver.expect(problem, &state, held);
         }
     }
+    let mut secant = steps.last().map_or(0.0, |step: &StepRecord| secant::next(solver.secant(), step.damping));
     let mut residuals = problem.residuals(&u, &state, &lambda);
     let mut admissible = !steps.is_empty() || problem.is_admissible(&u);
     let mut attempts: Vec<step::Step> = Vec::new();
@@ -232,11 +237,14 @@ pub fn solve(
         if attempts.is_empty() && pause(&standing) {
             break Outcome::Stopped;
         }
+        if steps.last().is_some_and(|step| step.local_residual > forcing::LOOSEST) {
+            solver.sharpen();
+        }
         let watch = timer.total_seconds();
         if problem.is_linear() && settings.accuracy.is_none() {
             forcing.drop = solver.linear_drop();
         }
-        let step = match solver.solve(problem, (&u, &state), forcing, timer, &|n| alive(steps.len() + 1, n)) {
+        let step = match solver.solve(problem, (&u, &state, secant), forcing, timer, &|n| alive(steps.len() + 1, n)) {
             Ok(step) => step,
             Err(message) => break Outcome::Singular(message),
         };
@@ -266,6 +274,7 @@ pub fn solve(
         let criterion = problem.relative_change(&u, &damped.u, &damped.state.terms);
         u = damped.u;
         state = damped.state;
+        secant = secant::next(secant, damped.length);
         lambda = step.lambda;
         admissible = true;
         let before = residuals.largest();
@@ -280,6 +289,7 @@ pub fn solve(
             plastic_elements: state.plastic,
             active_contacts: problem.active_contacts(&lambda),
             statistics: attempts.iter().fold(step.statistics, |sum, attempt| sum + attempt.statistics),
+            local_residual: step.local_residual,
             applications: step.applications + attempts.iter().map(|a| a.applications).sum::<usize>(),
             factorisations: step.factorisations + attempts.iter().map(|a| a.factorisations).sum::<usize>(),
             seconds: timer.total_seconds() - watch,

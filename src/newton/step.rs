@@ -7,9 +7,10 @@ use super::basis::{Bases, Basis};
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
 use super::motion;
-use super::problem::{State, TornProblem};
+use super::problem::{State, TornProblem, dot};
 use super::program::{Found, ProgramSettings, ProgramState, Programs};
 use super::recover;
+use super::refine::refine;
 use crate::assembly::stiffness;
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
@@ -27,6 +28,9 @@ use crate::qp::{Outcome, Statistics};
 /// more iterations.)
 const DRIFT: f64 = 0.1;
 
+/// Residual of the subdomains' problems that is small enough whatever the accuracy of the step.
+const EXACT: f64 = 1e-8;
+
 /// Result of one step.
 pub struct Step {
     /// Increment of the displacement.
@@ -39,7 +43,9 @@ pub struct Step {
     pub statistics: Statistics,
     /// Whether it was solved to the tolerance of the scene.
     pub at_floor: bool,
-    /// Applications of F, those around the quadratic program included.
+    /// Residual of the subdomains' problems `K du = f - F(u) - B'lambda` that rounding leaves, relative to their forces.
+    pub local_residual: f64,
+    /// Applications of F, those around the quadratic program and of refinement included.
     pub applications: usize,
     /// Subdomains with a new factor, over all ranks; those that share one count, too.
     pub factorisations: usize,
@@ -50,6 +56,8 @@ pub struct Step {
 pub struct SolverState {
     /// Of the quadratic programs.
     pub programs: ProgramState,
+    /// Share of the secant stiffness in the last step.
+    pub secant: f64,
     /// What new factors are stored in at least.
     pub precision: Precision,
     /// What the factors of each own subdomain are of.
@@ -62,6 +70,8 @@ pub struct StepSolver<'a> {
     pub(super) projector: Projector<'a>,
     preconditioner: Option<Preconditioner<'a>>,
     pub(super) programs: Programs,
+    /// Share of the secant stiffness in all factors of subdomains that yield.
+    secant: f64,
     /// Congruent subdomains have the same number.
     twins: Vec<Option<usize>>,
     /// Lower values of each own subdomain's tangent, as it was factorised.
@@ -83,13 +93,13 @@ impl<'a> StepSolver<'a> {
     ) -> Self {
         let (tangents, bases) = (vec![Rc::default(); twins.len()], vec![Bases::default(); twins.len()]);
         let (programs, assembled) = (Programs::new(settings), Vec::new());
-        Self { operator, projector, preconditioner, programs, twins, tangents, bases, assembled }
+        Self { operator, projector, preconditioner, programs, secant: 0.0, twins, tangents, bases, assembled }
     }
 
     /// What the next steps depend on.
     pub fn state(&self) -> SolverState {
         let precision = self.operator.factors.precision();
-        SolverState { programs: self.programs.state(), precision, bases: self.bases.clone() }
+        SolverState { programs: self.programs.state(), secant: self.secant, precision, bases: self.bases.clone() }
     }
 
     /// Goes on from such a state, with the multipliers that belong to it: makes the factors again, to the same bits.
@@ -104,7 +114,8 @@ impl<'a> StepSolver<'a> {
         lambda: &[f64],
         timer: &Timer,
     ) -> Result<(), String> {
-        let SolverState { programs, precision, bases } = state;
+        let SolverState { programs, secant, precision, bases } = state;
+        self.secant = secant;
         self.programs.resume(&self.projector.coarse, programs, lambda);
         self.operator.factors.set_precision(precision);
         let mut failure = None;
@@ -152,11 +163,16 @@ impl<'a> StepSolver<'a> {
         match basis {
             Basis::Elastic => {
                 let (material, rest) = (Material { yield_stress: None, ..*material }, vec![0.0; subdomain.dofs()]);
-                stiffness::assemble(subdomain, &material, &[], &rest, pattern, &mut values)
+                stiffness::assemble(subdomain, &material, &[], (&rest, 0.0), pattern, &mut values)
             }
-            Basis::At(u) => {
-                stiffness::assemble(subdomain, material, problem.committed.history(own), u, pattern, &mut values)
-            }
+            Basis::At(u) => stiffness::assemble(
+                subdomain,
+                material,
+                problem.committed.history(own),
+                (u, self.secant),
+                pattern,
+                &mut values,
+            ),
         };
         values
     }
@@ -210,6 +226,7 @@ impl<'a> StepSolver<'a> {
     /// larger than earlier ones.
     pub fn begin(&mut self) {
         self.programs.begin();
+        self.secant = 0.0;
         self.bases.iter_mut().for_each(Bases::commit);
     }
 
@@ -229,20 +246,25 @@ impl<'a> StepSolver<'a> {
         }
     }
 
-    /// Solves for the step at `u`; `alive` is told the applications of F so far. Collective.
+    /// Share of the secant stiffness in the last step.
+    pub fn secant(&self) -> f64 {
+        self.secant
+    }
+
+    /// Solves for the step at `u`, with a share of the `secant` stiffness; `alive` is told the applications of F so far. Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent or the coarse problem is singular.
     pub fn solve(
         &mut self,
         problem: &TornProblem,
-        (u, state): (&Torn, &State),
+        (u, state, secant): (&Torn, &State, f64),
         forcing: Forcing,
         timer: &Timer,
         alive: &dyn Fn(usize),
     ) -> Result<Step, String> {
         let before = self.operator.applications();
-        let factorisations = self.update_tangents(problem, u, state, forcing.left, timer)?;
+        let factorisations = self.update_tangents(problem, (u, state, secant), forcing.left, timer)?;
         let rows = problem.gather.rows();
 
         let forces = problem.unbalance(state);
@@ -267,9 +289,22 @@ impl<'a> StepSolver<'a> {
         let found = self.programs.solve(problem, dual, warm, b, forcing).map_err(|floating| floating.to_string())?;
         let Found { lambda, balanced, outcome, statistics, at_floor } = found;
 
-        let mut du = forces;
         let mut defect = vec![0.0; rows];
+        let mut local = forces.clone();
+        problem.gather.add_transpose(-1.0, &balanced, &mut local);
+        let mut du = forces;
         self.respond(&balanced, &mut du, &mut defect, timer);
+        let wanted = forcing.drop.max(EXACT);
+        let norm = |x: &Torn| {
+            let squares: Vec<f64> = x.iter().map(|x| dot(x, x)).collect();
+            problem.space.sum(&squares, 1)[0].sqrt()
+        };
+        let (local_residual, refined) = timer.time("refinement", || {
+            refine(&mut self.operator.factors, &self.tangents, &norm, (&local, &mut du), wanted)
+        });
+        if refined > 0 {
+            problem.gather.apply(&du, &mut defect);
+        }
         defect.iter_mut().zip(&slack).for_each(|(d, s)| *d -= s);
         if let Some(held) = self.programs.held() {
             let coarse = &self.projector.coarse;
@@ -277,8 +312,8 @@ impl<'a> StepSolver<'a> {
             recover::add_rigid_motion(problem, -1.0, &back, &mut du);
         }
         self.mend(problem, &slack, &mut du, timer);
-        let applications = self.operator.applications() - before;
-        Ok(Step { du, lambda, outcome, statistics, at_floor, applications, factorisations })
+        let applications = self.operator.applications() - before + refined;
+        Ok(Step { du, lambda, outcome, statistics, at_floor, local_residual, applications, factorisations })
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.
@@ -325,11 +360,13 @@ impl<'a> StepSolver<'a> {
     fn update_tangents(
         &mut self,
         problem: &TornProblem,
-        u: &Torn,
-        state: &State,
+        (u, state, secant): (&Torn, &State, f64),
         left: f64,
         timer: &Timer,
     ) -> Result<usize, String> {
+        // All factors are of one share: that is all to know to make them again.
+        let keep = secant == 0.0 && self.secant == 0.0;
+        self.secant = secant;
         let mut failure: Option<NotDefinite> = None;
         let mut factorised = Vec::with_capacity(u.len());
         for (own, subdomain) in problem.subdomains.iter().enumerate() {
@@ -349,12 +386,14 @@ impl<'a> StepSolver<'a> {
             let (material, history) = (&problem.materials[own], problem.committed.history(own));
             self.assembled.resize(pattern.rows.len(), 0.0);
             let assembled = &mut self.assembled;
-            timer.time("assembly", || stiffness::assemble(subdomain, material, history, &u[own], pattern, assembled));
+            timer.time("assembly", || {
+                stiffness::assemble(subdomain, material, history, (&u[own], secant), pattern, assembled)
+            });
             let known = self.bases[own].factor.is_some();
             let change = if known { pattern.difference(&self.tangents[own], assembled) } else { f64::INFINITY };
             // Where twins are elastic on other ranks only, it gets what it would get from one of them here.
             let common = elastic && self.twins[own].is_some();
-            if change <= left && !common {
+            if keep && change <= left && !common {
                 factorised.push(0.0);
                 continue;
             }
@@ -369,7 +408,7 @@ impl<'a> StepSolver<'a> {
             timer.count("factorisation", factors.symbolic(own).analysis().flops(), 0.0);
             let drift = self.bases[own].drift;
             failure = match outcome {
-                Ok(()) if common || drift.is_nan() || drift > DRIFT => {
+                Ok(()) if common || !keep || drift.is_nan() || drift > DRIFT => {
                     self.take_interior(own, subdomain.id, &values, basis, common, timer).err()
                 }
                 outcome => outcome.err(),

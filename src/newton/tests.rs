@@ -185,3 +185,61 @@ fn a_history_stopped_after_halvings_goes_on_to_the_same_bits() {
     assert!(whole[0].0.steps.iter().any(|row| row.halvings > 0), "{:?}", whole[0].0.steps);
     stopped_anywhere_it_arrives_at_the_same_bits(&scene, 1);
 }
+
+/// A body far stiffer than it is strong begins to flow everywhere at once: strains grow a million times. The line search cuts
+/// step after step there, and the secant stiffness takes over.
+#[test]
+fn a_rigid_body_that_flows_is_solved_with_the_secant_stiffness_in_between() {
+    let scene = plastic(&["material.hard.young=2.1e8", "load.top.traction=[0.0, 0.0, -0.5]"]);
+    let (summary, _) = solve(&scene, 1);
+    assert_eq!(summary.converged, Some(true), "{:?}", summary.error);
+    let cut: Vec<usize> = (1..).zip(&summary.newton).filter(|(_, row)| row.damping < 0.25).map(|(n, _)| n).collect();
+    assert!(cut.first().is_some_and(|&n| n < summary.newton.len()), "{:?}", summary.newton);
+    let energies = energies(&summary);
+    assert!(energies.windows(2).all(|e| e[1] <= e[0] + 1e-9 * e[0].abs()), "{energies:?}");
+    stopped_anywhere_it_arrives_at_the_same_bits(&scene, 2);
+}
+
+/// A bar under tension bears its yield stress, whatever the mesh.
+#[test]
+fn above_the_limit_load_the_last_equilibrium_is_kept_and_named() {
+    const BAR: &str = r#"
+        [material.bar]
+        young = 210.0
+        poisson = 0.29
+        yield_stress = 0.45
+        [body.bar]
+        material = "bar"
+        element = "hex8"
+        brick = { origin = [0.0, 0.0, 0.0], size = [1.0, 1.0, 4.0], cells = [2, 2, 4] }
+        [support.x]
+        surface = "bar.xmin"
+        fix = ["x"]
+        [support.y]
+        surface = "bar.ymin"
+        fix = ["y"]
+        [support.z]
+        surface = "bar.zmin"
+        fix = ["z"]
+        [load.top]
+        surface = "bar.zmax"
+        traction = [0.0, 0.0, 0.6]
+        [decomposition]
+        cells = [2, 2, 2]
+    "#;
+    let sets = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+        Scene::from_text(BAR, "bar", 1, &sets).expect("the scene is sound")
+    };
+    let (summary, _) = solve(&sets(&[]), 2);
+    assert_eq!(summary.converged, Some(false));
+    let last = summary.steps.last().expect("there is an equilibrium");
+    let limit = 0.45 / 0.6;
+    assert!(last.converged && last.time <= limit && last.time > limit - 1.0 / 16.0, "{}", last.time);
+    assert!(summary.state.max_von_mises.is_some_and(|s| (s / (0.6 * last.time) - 1.0).abs() < 1e-6), "{summary:?}");
+    let error = summary.error.expect("it is told");
+    assert!(error.contains(&format!("{:.4} of the load", last.time)) && error.contains("limit load"), "{error}");
+
+    let (below, _) = solve(&sets(&["load.top.traction=[0.0, 0.0, 0.44]"]), 2);
+    assert_eq!((below.converged, below.steps.len()), (Some(true), 1));
+}

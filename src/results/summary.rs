@@ -273,6 +273,8 @@ pub struct NewtonRow {
     pub active_contacts: u64,
     /// `J` after the step.
     pub energy: f64,
+    /// Residual of the subdomains' stiffness problems, relative to their forces: what rounding costs.
+    pub local_residual: f64,
     /// Outer iterations of the QP solver: multiplier updates of SMALSE-M, sets of the active-set method.
     pub qp_iterations: u64,
     /// Applications of F.

@@ -149,7 +149,16 @@ impl Scene {
 
     /// The load history: one step to the full loads if the scene gives none.
     pub fn steps(&self) -> &[Step] {
-        if self.step.is_empty() { &step::AT_ONCE } else { &self.step }
+        match self.step.is_empty() {
+            false => &self.step,
+            true if self.has_limit_load() => &step::AT_MOST,
+            true => &step::AT_ONCE,
+        }
+    }
+
+    /// Whether a material flows without hardening, so that there are loads without an equilibrium.
+    pub fn has_limit_load(&self) -> bool {
+        self.material.values().any(|m| m.yield_stress.is_some() && m.hardening + m.kinematic_hardening == 0.0)
     }
 
     /// Surfaces that supports, loads and contacts name, with repetitions.

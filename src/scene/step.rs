@@ -26,6 +26,9 @@ pub struct Step {
 /// The history of a scene that gives none: everything at once.
 pub(super) static AT_ONCE: [Step; 1] = [Step::whole(0)];
 
+/// The same where there may be no equilibrium under all of it: what part there is one under is found by halving.
+pub(super) static AT_MOST: [Step; 1] = [Step::whole(5)];
+
 impl Step {
     const fn whole(halvings: u32) -> Self {
         Step {

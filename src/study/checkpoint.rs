@@ -50,6 +50,7 @@ struct Numbers {
     norm: Option<f64>,
     has_kept: bool,
     is_double: bool,
+    secant: f64,
     rows: Vec<StepRow>,
     times: Vec<f64>,
 }
@@ -95,6 +96,7 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         norm,
         has_kept: kept.is_some(),
         is_double: solver.precision == Precision::Double,
+        secant: solver.secant,
         rows,
         times: recorded.times,
     };
@@ -310,7 +312,7 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
         u: torn("points/displacement")?,
         lambda: column(0),
         forcing: numbers.forcing,
-        solver: SolverState { programs, precision, bases },
+        solver: SolverState { programs, secant: numbers.secant, precision, bases },
         steps: numbers.own_steps,
     };
     let halt = Halt { attempt: numbers.attempt, committed, last, steps: numbers.steps, standing };

@@ -12,10 +12,12 @@ use crate::results::fields::{self, ContactState};
 use crate::results::summary::{self, Counters, NewtonRow, Residuals, State, StepRow, Summary};
 use crate::scene::{self, Scene};
 
-/// Where in the history an attempt leads, in words; scenes without `[[step]]` have no history to speak of.
+/// Where in the history an attempt leads, in words; nothing where all acts at once.
 pub(super) fn place(scene: &Scene, at: At) -> Option<String> {
-    let step = scene.step.get(at.stage)?;
-    let mut text = load_step(scene, at.stage)?;
+    let Some(mut text) = load_step(scene, at.stage) else {
+        return (at.fraction < 1.0).then(|| format!("up to {:.4} of the load", at.fraction));
+    };
+    let step = &scene.steps()[at.stage];
     if step.increments > 1 {
         text += &format!(", increment {} of {}", at.increment, step.increments);
     }
@@ -78,11 +80,23 @@ pub(super) fn newton_row(increment: usize, record: &StepRecord) -> NewtonRow {
         plastic_elements: record.plastic_elements as u64,
         active_contacts: record.active_contacts as u64,
         energy: record.energy,
+        local_residual: record.local_residual,
         qp_iterations: (record.statistics.outer + record.statistics.sets) as u64,
         hessian_multiplications: record.applications as u64,
         factorisations: record.factorisations as u64,
         seconds: record.seconds,
     }
+}
+
+/// What to tell where rounding spoils a step more than the loosest quadratic program would.
+pub(super) fn loss_of_accuracy(record: &StepRecord) -> Option<String> {
+    let StepRecord { number, local_residual, .. } = record;
+    (*local_residual > newton::forcing::LOOSEST).then(|| {
+        format!(
+            "Newton step {number} lost accuracy: stiffness matrices are so near to singular that rounding leaves {local_residual:.1e} \
+             of the forces on subdomains out of balance; factors are in double precision from here on"
+        )
+    })
 }
 
 /// The Newton steps as columns of a table; with more than one increment the first says which.
@@ -95,6 +109,7 @@ pub(super) fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
         column("residual", |r| r.residual),
         column("damping", |r| r.damping),
         column("energy", |r| r.energy),
+        column("local_residual", |r| r.local_residual),
         column("plastic_elements", |r| r.plastic_elements as f64),
         column("active_contacts", |r| r.active_contacts as f64),
         column("hessian_multiplications", |r| r.hessian_multiplications as f64),
@@ -127,8 +142,12 @@ pub(super) fn summarise(
     let state = rows.last().map(|row| row.state.clone()).unwrap_or_default();
     let total = |count: fn(&StepRecord) -> usize| Some(steps.iter().map(|(_, s)| count(s)).sum::<usize>() as u64);
     let message = |(at, outcome): &(At, newton::Outcome)| {
-        let message = outcome.message()?;
-        Some(place(scene, *at).map_or(message.clone(), |place| format!("{place}: {message}")))
+        let mut message = outcome.message()?;
+        if scene.has_limit_load() {
+            message = collapse(scene, &rows, *at, &message);
+        }
+        let place = place(scene, *at).filter(|_| !scene.step.is_empty());
+        Some(place.map_or(message.clone(), |place| format!("{place}: {message}")))
     };
     Summary {
         title: scene.title.clone(),
@@ -187,6 +206,22 @@ fn state(discrete: &Discrete, problem: &TornProblem, solution: &Solution, contac
             ended_by_accuracy: Some(solution.ended_by_accuracy),
         },
     }
+}
+
+/// What to tell where a body without hardening does not bear its load.
+fn collapse(scene: &Scene, rows: &[StepRow], at: At, reason: &str) -> String {
+    let (begin, unit) = if scene.step.is_empty() { ("", " of the load") } else { ("time ", "") };
+    let failed = at.time();
+    let Some(reached) = rows.iter().filter(|row| row.converged).map(|row| row.time).next_back() else {
+        return format!(
+            "no equilibrium was found, not even at {begin}{failed:.4}{unit}: bodies without hardening bear less than their limit \
+             load, and this is probably more ({reason})"
+        );
+    };
+    format!(
+        "no equilibrium was found above {begin}{reached:.4}{unit}, and none at {failed:.4}: the limit load of bodies without \
+         hardening is probably between them; the last results are those at {reached:.4}"
+    )
 }
 
 /// The solver of the quadratic programs, by its name in scene files.

@@ -1,7 +1,7 @@
 //! Scenes that are hard for the method: near incompressibility, perfect plasticity, jumps of stiffness, degenerate
 //! contact, bodies that only contact holds, decompositions into shreds or into whole bodies.
 
-use crate::common::{Run, assert_close, assert_near, assert_residuals, number, scene_file, solve, vector};
+use crate::common::{Run, assert_close, assert_near, assert_residuals, number, scene_file, solve, solve_with, vector};
 use serde_json::Value;
 
 const RANKS: usize = 2;
@@ -53,6 +53,53 @@ fn almost_perfect_plasticity_below_collapse_converges() {
     assert!(number(&summary, "plastic_elements") > 0.0);
     // The yield surface grows by next to nothing.
     assert_close("largest stress", number(&summary, "max_von_mises"), 450.0, 1e-4);
+}
+
+/// No history is asked for: the load is halved until there is an equilibrium.
+#[test]
+fn above_the_limit_load_the_last_equilibrium_is_told_and_kept() {
+    // Beyond the limit no program has a solution: it need not be sought for long.
+    let sets = [&COARSE[..], &["material.lower.hardening=0", "material.upper.hardening=0"]].concat();
+    let sets = [&sets[..], &["load.top.traction.2=-400", "solver.qp_limit=400", "solver.newton_limit=15"]].concat();
+    let run = solve(RANKS, "two-blocks", &sets);
+    assert_eq!(run.code, 1, "{}", run.stderr);
+    let summary = run.summary();
+    let error = summary["error"].as_str().unwrap();
+    let rows = summary["steps"].as_array().unwrap();
+    let last = rows.last().unwrap();
+    let time = number(last, "time");
+    assert!(rows.iter().all(|row| row["converged"] == true) && time > 0.0 && time < 1.0, "{rows:?}");
+    assert!(error.contains("limit load") && error.contains(&format!("{time:.4} of the load")), "{error}");
+    assert_balance(last, time * 1.2e9);
+    assert_close("largest stress", number(last, "max_von_mises"), 450.0, 1e-6);
+}
+
+/// Layers of cells a thousand times as wide as thick.
+#[test]
+fn slivers_converge() {
+    let summary = assert_solved(solve(RANKS, concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hard/slivers.toml"), &[]));
+    assert_balance(&summary, 4.5e8);
+    assert!(number(&summary, "active_contacts") > 0.0 && number(&summary, "plastic_elements") > 0.0);
+}
+
+/// What the mesh costs is told, and the solver stops well below it.
+#[test]
+fn no_more_accuracy_is_bought_than_asked_for() {
+    let solved = |more: &[&str]| {
+        let summary =
+            solve_with(RANKS, "two-blocks", 1, &COARSE, &[&["--cascade", "off"], more].concat()).converged().summary();
+        let [algebraic, mesh] = ["error_algebraic", "error_discretisation"].map(|key| number(&summary, key));
+        (summary, algebraic, mesh)
+    };
+    let (whole, algebraic, mesh) = solved(&[]);
+    let (short, loose, same_mesh) = solved(&["--accuracy", "0.1"]);
+    assert!(algebraic < loose && loose <= 0.1 * same_mesh, "{algebraic:e} {loose:e} {same_mesh:e}");
+    assert_close("error of the mesh", same_mesh, mesh, 0.02);
+    assert_eq!((&whole["ended_by_accuracy"], &short["ended_by_accuracy"]), (&false.into(), &true.into()));
+    assert!(number(&short, "newton_iterations") < number(&whole, "newton_iterations"));
+    // The energy is above its minimum by the duality gap at most.
+    let above = number(&short, "energy") - number(&whole, "energy");
+    assert!(above >= 0.0 && above <= number(&short, "duality_gap"), "{above:e}");
 }
 
 #[test]

@@ -27,6 +27,28 @@ fn moved(strain: &Voigt, direction: &Voigt, by: f64) -> Voigt {
     std::array::from_fn(|i| strain[i] + by * direction[i])
 }
 
+/// Its model lies above the potential everywhere; what is between it and the tangent is linear in the share.
+#[test]
+fn the_secant_stiffness_majorises_the_potential() {
+    let mut random = Random::new(11);
+    for (material, strain, history) in states() {
+        let secant = material.stiffness(&strain, &history, 1.0);
+        for size in [1e-6, 1e-3, 1e-1] {
+            let change: Voigt = random.vector(size);
+            let model = 0.5 * quadratic(&secant, &change);
+            let true_one = material.divergence(&strain, &change, &history);
+            assert!(true_one <= model * (1.0 + 1e-9), "{size:e}: {true_one:e} above {model:e}");
+            let between = 0.5 * quadratic(&material.stiffness(&strain, &history, 0.3), &change);
+            let tangent = 0.5 * quadratic(&material.tangent(&strain, &history), &change);
+            assert!((between - (0.3 * model + 0.7 * tangent)).abs() <= 1e-12 * model);
+        }
+    }
+}
+
+fn quadratic(matrix: &Tangent, x: &Voigt) -> f64 {
+    (0..6).map(|i| (0..6).map(|j| x[i] * matrix[i][j] * x[j]).sum::<f64>()).sum()
+}
+
 /// x with matrix x = right, by Gaussian elimination without pivoting (the matrices are positive definite).
 fn solve(mut matrix: Tangent, mut right: Voigt) -> Voigt {
     for k in 0..6 {
