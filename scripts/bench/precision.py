@@ -1,7 +1,9 @@
-"""Work against precision on the benchmark: elements, meshes, tolerances and QP solvers against the limit of refined meshes."""
+"""Work against precision: elements, meshes, tolerances and QP solvers, against limits of refined meshes or a closed form."""
 
 import itertools
 import json
+import math
+import typing
 
 from . import plot
 from .markdown import table
@@ -10,49 +12,118 @@ from .measure import ROOT, Run
 RANKS = 2
 RESULTS = ROOT / "bench-results"
 RAW = RESULTS / "raw" / "precision"
-ELEMENTS = {"tet4": [5, 10, 20], "hex8": [5, 10, 20], "tet10": [5, 10, 15]}
-"""Cells along 1000 mm: the contact strip begins at 600 mm, so that multiples of 5 match."""
+ELEMENTS = ["tet4", "hex8", "tet10"]
 LIMIT = ["tet10", "hex8"]
 """Elements whose energies are extrapolated, the better one first."""
 TOLERANCES = ["1e-2", "1e-4"]
 SOLVERS = ["active-set", "smalse-m"]
 STRICT = TOLERANCES[-1]
-WANTED = [0.1, 0.05, 0.02, 0.01]
+WANTED = [0.1, 0.05, 0.02, 0.01, 0.001, 0.0001]
 
 
-def boxes(element, cells):
-    """Cells along an edge of a subdomain, the program's own choice where it divides the bodies."""
-    return 10 if element != "tet10" and cells % 10 == 0 else 5
 
 
-def options(element, cells, tolerance, solver):
+class Case(typing.NamedTuple):
+    scene: str
+    meshes: dict
+    """Of each element: cells along some length."""
+    mesh: typing.Callable
+    """Keys of the scene, by element and cells."""
+    about: str
+    measure: typing.Callable = lambda summary: summary["energy"]
+    """What the error is of, from a summary."""
+    exact: float | None = None
+    """Its closed form; else it is extrapolated."""
+    solvers: list = SOLVERS
+    exit_codes: tuple = (0,)
+
+
+def blocks(element, cells):
+    """Cells along 1000 mm, in subdomains of the program's own choice where that divides the bodies."""
+    box = 10 if element != "tet10" and cells % 10 == 0 else 5
+    sets = [f"body.{body}.brick.cells=[{3 * cells}, {cells}, {cells}]" for body in ("lower", "upper")]
+    return sets + [f"body.{body}.element={element}" for body in ("lower", "upper")] + [f"decomposition.cells={[box] * 3}"]
+
+
+def spheres(*bodies):
+    """Cells through each wall and along half an edge."""
+
+    def sets(element, cells):
+        of = [(f"body.{body}.element={element}", f"body.{body}.sphere.cells=[{cells}, {cells}]") for body in bodies]
+        return [key for keys in of for key in keys]
+
+    return sets
+
+
+def last_pressure(summary):
+    """Of the history in scenes/precision/limit-sphere.toml."""
+    amplitudes = [0.0, 560.0, 720.0]
+    time = max((step["time"] for step in summary["steps"] if step["converged"]), default=0.0)
+    before = min(int(time), len(amplitudes) - 2)
+    return amplitudes[before] + (time - before) * (amplitudes[before + 1] - amplitudes[before])
+
+
+CASES = {
+    "two-blocks": Case(
+        "two-blocks", {"tet4": [5, 10, 20], "hex8": [5, 10, 20], "tet10": [5, 10, 15]}, blocks,
+        "the benchmark, n cells along 1000 mm (level 1 has 10; the contact strip begins at 600 mm, so that multiples of 5 match). "
+        "The error is that of the energy J, relative. As far as J is quadratic its root is the error of stresses in the energy "
+        "norm; here the load is close to collapse",
+    ),
+    "nested-spheres": Case(
+        "scenes/precision/nested-spheres.toml", {"tet4": [4, 8, 12], "hex8": [4, 8, 12], "tet10": [2, 4, 6]}, spheres("inner", "outer"),
+        "a yielding sphere that closes the gap to another one, n cells through each wall. The error is that of the energy J, "
+        "relative; facets that cut off the sphere have their share in it",
+    ),
+    "limit-sphere": Case(
+        "scenes/precision/limit-sphere.toml", {"tet4": [4, 6, 8], "hex8": [2, 4, 6], "tet10": [1, 2, 3]}, spheres("wall"),
+        "the limit pressure of a perfectly plastic hollow sphere, 2 sigma_y ln(b/a), n cells through the wall: the last "
+        "equilibrium of a history whose increments are halved ten times. No contact, so the QP solver is conjugate gradients",
+        last_pressure, 2 * 450.0 * math.log(2.0), ["active-set"], (0, 1),
+    ),
+}
+
+
+def options(case, element, cells, tolerance, solver):
     """Newton's criterion, and with it the residual in the proportion of the defaults; all from rest."""
-    sets = [f"body.{body}.element={element}" for body in ("lower", "upper")]
-    sets += [f"body.{body}.brick.cells=[{3 * cells}, {cells}, {cells}]" for body in ("lower", "upper")]
-    sets += [f"decomposition.cells={[boxes(element, cells)] * 3}", f"solver.newton_tolerance={tolerance}"]
+    sets = CASES[case].mesh(element, cells) + [f"solver.newton_tolerance={tolerance}"]
     sets += [f"solver.residual_tolerance={float(tolerance) / 100:g}", f"solver.qp={solver}"]
-    return ["two-blocks", "--cascade", "off", *(word for key in sets for word in ("--set", key))]
+    return [CASES[case].scene, "--cascade", "off", *(word for key in sets for word in ("--set", key))]
 
 
-def runs(elements, cells, tolerances, solvers):
-    """The quick ones first."""
-    kinds = itertools.product(cells or sorted({n for of in ELEMENTS.values() for n in of}), solvers, elements, tolerances)
+def kinds(case):
+    """All choices; the quick ones first."""
+    meshes = CASES[case].meshes
+    sizes = sorted({n for of in meshes.values() for n in of})
+    found = itertools.product(sizes, CASES[case].solvers, ELEMENTS, TOLERANCES)
+    return [(element, n, tolerance, solver) for n, solver, element, tolerance in found if n in meshes[element]]
+
+
+def runs(cases, elements, cells, tolerances, solvers):
+    """What is asked for; `cells` of None means all."""
     return [
         Run(
-            {"element": element, "cells": n, "tolerance": tolerance, "qp": solver, "ranks": RANKS},
-            options(element, n, tolerance, solver),
+            {"case": case, "element": element, "cells": n, "tolerance": tolerance, "qp": solver, "ranks": RANKS},
+            options(case, element, n, tolerance, solver),
             RANKS,
         )
-        for n, solver, element, tolerance in kinds
-        if n in ELEMENTS[element]
+        for case in cases
+        for element, n, tolerance, solver in kinds(case)
+        if element in elements and (not cells or n in cells) and tolerance in tolerances and solver in solvers
     ]
 
 
 def read(folder):
-    """The last converged record of each kind."""
+    """The last usable record of each kind, by case."""
     lines = [json.loads(line) for file in sorted(folder.glob("*.jsonl")) for line in file.read_text().splitlines()]
     lines.sort(key=lambda record: record["provenance"]["date"])
-    return {key_of(record): record for record in lines if record["exit_code"] == 0}
+    found = {case: {} for case in CASES}
+    for record in lines:
+        # Until there were others, the benchmark was the only case.
+        case = record.get("case", "two-blocks")
+        if record["summary"] and record["exit_code"] in CASES[case].exit_codes:
+            found[case][key_of(record)] = record
+    return found
 
 
 def key_of(record):
@@ -89,9 +160,9 @@ def limits(records):
     return found
 
 
-def error(record, exact):
-    """Relative, of the energy J."""
-    return abs(record["summary"]["energy"] / exact - 1)
+def errors(case, records, exact):
+    """Relative, of what the case is about."""
+    return {key: abs(CASES[case].measure(record["summary"]) / exact - 1) for key, record in records.items()}
 
 
 def gigabytes(summary):
@@ -115,37 +186,36 @@ def known_costs(records):
     return [name for name in COSTS if name != "time" or all(quiet(record) for record in records.values())]
 
 
-def picture(name, records, exact):
+def picture(case, name, records, error):
     """Error over one cost; a line for each element and QP solver, from mesh to mesh."""
     label, cost = COSTS[name]
     series = []
-    for element, solver in itertools.product(ELEMENTS, SOLVERS):
-        of = [r for (e, _, t, q), r in sorted(records.items()) if (e, t, q) == (element, STRICT, solver)]
+    for element, solver in itertools.product(ELEMENTS, CASES[case].solvers):
+        of = [key for key in sorted(records) if (key[0], key[2], key[3]) == (element, STRICT, solver)]
         if of:
-            series.append((f"{element}, {solver}", {cost(r): error(r, exact) for r in of}, False))
-    return plot.curves(f"two-blocks: error against {label}", label, "relative error of the energy", series)
+            series.append((f"{element}, {solver}", {cost(records[key]): error[key] for key in of}, False))
+    return plot.curves(f"{case}: error against {label}", label, "relative error", series)
 
 
 HEAD = """\
 # Work against precision, measured
 
-Written by `scripts/precision write` from the runs in [raw/precision](raw/precision), which `scripts/precision run` measured: the
-benchmark on meshes of n cells along 1000 mm (level 1 has 10), from rest. Newton's tolerance goes with a tolerance of the
-residual that is a hundredth of it; all else is default.
+Written by `scripts/precision write` from the runs in [raw/precision](raw/precision), which `scripts/precision run` measured, all
+from rest. Newton's tolerance goes with a tolerance of the residual that is a hundredth of it; all else is default.
 
-- *error*: |J - J*| / |J*|. As far as J is quadratic its root is the error of stresses in the energy norm; here the load is close
-  to collapse. J* is extrapolated from the three finest meshes of one element, J(n) = J* + c n^-p.
+- *J**: where there is no closed form of what the error is of, it is extrapolated from the three finest meshes of one element,
+  J(n) = J* + c n^-p.
 - *F*: applications; *GB read*: of factors, in the dual operator and the preconditioner, which stands for time on any machine;
   *MiB*: the largest resident memory, summed over the ranks; *s*: blank where the machine was busy with other work.
 """
 
 
-def cheapest(records, exact):
+def cheapest(records, error):
     """For each wanted error the choice that reaches it at the least cost."""
     names = known_costs(records)
     rows = []
     for wanted in WANTED:
-        enough = [(key, record) for key, record in records.items() if error(record, exact) <= wanted]
+        enough = [(key, record) for key, record in records.items() if error[key] <= wanted]
         cells = []
         for name in names:
             if not enough:
@@ -157,14 +227,15 @@ def cheapest(records, exact):
     return table(["error at most", *(COSTS[name][0] for name in names)], rows)
 
 
-def rows(records, exact):
+def rows(case, records, error):
     order = {element: place for place, element in enumerate(ELEMENTS)}
     for (element, n, tolerance, solver), record in sorted(records.items(), key=lambda pair: (order[pair[0][0]], *pair[0][1:])):
         summary = record["summary"]
         yield [
-            f"{element}, n = {n}", tolerance, solver, summary["primal_dofs"], f"{summary['energy']:.8g}",
-            f"{100 * error(record, exact):.2f} %", summary["newton_iterations"], summary["hessian_multiplications"],
-            f"{gigabytes(summary):.1f}", f"{summary['peak_rss_mb']:.0f}", f"{summary['time_total']:.2f}" if quiet(record) else "",
+            f"{element}, n = {n}", tolerance, solver, summary["primal_dofs"], f"{CASES[case].measure(summary):.8g}",
+            f"{100 * error[element, n, tolerance, solver]:.3g} %", summary["newton_iterations"],
+            summary["hessian_multiplications"], f"{gigabytes(summary):.1f}", f"{summary['peak_rss_mb']:.0f}",
+            f"{summary['time_total']:.2f}" if quiet(record) else "",
         ]
 
 
@@ -178,21 +249,41 @@ def told(found):
     return f"{text} times this mean nothing.\n"
 
 
+def section(case, records):
+    """Text and pictures of a case; none where there is nothing to compare with."""
+    about, exact = CASES[case].about, CASES[case].exact
+    text = [f"## {case}\n", f"{about[0].upper()}{about[1:]}.\n"]
+    if exact is None:
+        found = limits(records)
+        if not found:
+            return text + ["Not enough meshes were measured to extrapolate.\n"], {}
+        exact = next(iter(found.values()))[0]
+        text.append(told(found))
+    else:
+        text.append(f"Closed form: {exact:.8g}.\n")
+    error = errors(case, records, exact)
+    text.append(cheapest(records, error))
+    prefix = "precision" if case == "two-blocks" else f"precision-{case}"
+    files = {RESULTS / f"{prefix}-{name.lower()}.svg": picture(case, name, records, error) for name in known_costs(records)}
+    text += [f"![{path.stem}]({path.name})\n" for path in files]
+    head = ["mesh", "Newton tolerance", "QP", "primal unknowns", "value", "error", "Newton steps", "F", "GB read", "MiB", "s"]
+    text.append(table(head, rows(case, records, error)))
+    missing = [f"{e}, n = {n}, {q}, {t}" for e, n, t, q in kinds(case) if (e, n, t, q) not in records]
+    return text + ([f"Not measured yet: {'; '.join(missing)}.\n"] if missing else []), files
+
+
 def contents(folder):
     """Every file this writes, with its text."""
-    records = read(folder)
-    found = limits(records)
+    found = {case: records for case, records in read(folder).items() if records}
     if not found:
         return {}
-    exact = next(iter(found.values()))[0]
-    text = [HEAD, told(found), cheapest(records, exact)]
-    files = {RESULTS / f"precision-{name.lower()}.svg": picture(name, records, exact) for name in known_costs(records)}
-    text += [f"![{path.stem}]({path.name})\n" for path in files]
-    head = ["mesh", "Newton tolerance", "QP", "primal unknowns", "J", "error", "Newton steps", "F", "GB read", "MiB", "s"]
-    text += [table(head, rows(records, exact))]
-    kinds = [key_of(run.label) for run in runs(ELEMENTS, None, TOLERANCES, SOLVERS)]
-    missing = [f"{e}, n = {n}, {q}, {t}" for e, n, t, q in kinds if (e, n, t, q) not in records]
-    text += [f"Not measured yet: {'; '.join(missing)}.\n"] if missing else []
-    commits = sorted({record["provenance"]["commit"][:12] for record in records.values()})
+    text, files = [HEAD], {}
+    for case, records in found.items():
+        more, pictures = section(case, records)
+        text += more
+        files |= pictures
+    missing = [case for case in CASES if case not in found]
+    text += [f"Not measured yet: {', '.join(missing)}.\n"] if missing else []
+    commits = sorted({record["provenance"]["commit"][:12] for records in found.values() for record in records.values()})
     text += [f"Program: {', '.join(commits)}, {RANKS} ranks.\n"]
     return files | {RESULTS / "precision.md": "\n".join(text)}
