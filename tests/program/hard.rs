@@ -61,7 +61,7 @@ fn above_the_limit_load_the_last_equilibrium_is_told_and_kept() {
     // Beyond the limit no program has a solution: it need not be sought for long.
     let sets = [&COARSE[..], &["material.lower.hardening=0", "material.upper.hardening=0"]].concat();
     let sets = [&sets[..], &["load.top.traction.2=-400", "solver.qp_limit=400", "solver.newton_limit=15"]].concat();
-    let run = solve(RANKS, "two-blocks", &sets);
+    let run = solve(1, "two-blocks", &sets);
     assert_eq!(run.code, 1, "{}", run.stderr);
     let summary = run.summary();
     let error = summary["error"].as_str().unwrap();
