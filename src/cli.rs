@@ -27,7 +27,7 @@ use crate::results::OutputError;
 use crate::results::agree::root_texts;
 use crate::results::summary::Summary;
 use crate::scene::{Scene, SceneError, library};
-use crate::study::{self, StudyError};
+use crate::study::{self, NoStart, StudyError};
 
 /// Contact of elasto-plastic bodies in 3D by Total-FETI domain decomposition on MPI.
 #[derive(Debug, Parser)]
@@ -122,7 +122,9 @@ impl Failure {
     /// Exit code (sysexits).
     pub fn code(&self) -> i32 {
         match self {
-            Self::Study(StudyError::Mesh(MeshError::Unreadable(_))) => 74,
+            Self::Study(StudyError::Mesh(MeshError::Unreadable(_)) | StudyError::NoStart(NoStart::Missing { .. })) => {
+                74
+            }
             Self::Scene(_) | Self::Study(_) => 65,
             Self::Input(_) | Self::Place(_) | Self::Output(_) => 74,
             Self::Stopped { .. } => 75,

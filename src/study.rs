@@ -4,8 +4,10 @@ pub mod checkpoint;
 mod conditions;
 mod contacts;
 mod discrete;
+mod meshes;
 mod report;
 mod sizes;
+mod state;
 
 use std::cell::{Cell, RefCell};
 use std::time::SystemTime;
@@ -48,6 +50,7 @@ use crate::scene::{self, Scene};
 pub use conditions::RightHandSides;
 pub use discrete::{Discrete, discretise, discretise_expecting};
 pub use sizes::{memory_estimate_mb, sizes};
+pub use state::{Earlier, NoStart, earlier};
 
 /// Why a scene has no discrete problem; the same on every rank.
 #[derive(Debug, Error)]
@@ -64,6 +67,9 @@ pub enum StudyError {
     /// Supports, contacts and loads together do not hold a body.
     #[error("{0}")]
     Unheld(String),
+    /// The state to start from is none.
+    #[error(transparent)]
+    NoStart(#[from] NoStart),
     /// Some body can move freely.
     #[error(transparent)]
     Floating(#[from] Floating),
@@ -72,12 +78,17 @@ pub enum StudyError {
     Stopped,
 }
 
+/// Gaps below this share of the largest displacement are closed.
+const ROUNDING: f64 = 1e-9;
+
 /// How the solution of a scene begins.
 pub enum Begin {
     /// From rest.
     Rest,
     /// Near its solution, which has no history.
     Near(newton::Start),
+    /// From the state that an earlier run left, without its loads.
+    After(Earlier),
     /// Where another one stood.
     At(Box<Standing>),
 }
@@ -230,7 +241,7 @@ pub fn solve_from(
     };
     let watch = Watch { timer, alive: &alive, step: &step };
     let mut piece = fields::mesh(subdomains, comm.rank());
-    let fixed = piece.cell_data.len();
+    let fixed = [piece.point_data.len(), piece.cell_data.len()];
     let (mut rows, mut closed): (Vec<StepRow>, Vec<u64>) = Default::default();
     let entry = match begin {
         Begin::Rest => Entry::Rest,
@@ -238,6 +249,13 @@ pub fn solve_from(
             // Without a history the right-hand sides at its beginning are those of its end.
             problem.make_admissible(&mut start.u);
             Entry::Near(start)
+        }
+        Begin::After(Earlier { committed, u }) => {
+            let closed = ROUNDING * committed.sizes.displacement;
+            let rows = constraints.rows.iter().zip(problem.slack(&u));
+            let held = rows.map(|(row, slack)| !row.is_inequality() || slack <= closed).collect();
+            problem.committed = committed;
+            Entry::Near(newton::Start { u, held })
         }
         Begin::At(standing) => {
             let Standing { halt, rows: reached, recorded: Piece { times, point_data, cell_data, .. } } = *standing;
@@ -269,7 +287,8 @@ pub fn solve_from(
     let pause = |halt: &dyn Fn() -> loading::Halt| {
         pause(&|| {
             let (Piece { times, point_data, cell_data, .. }, rows) = &*reached.borrow();
-            let (times, point_data, cell_data) = (times.clone(), point_data.clone(), cell_data[fixed..].to_vec());
+            let (point_data, cell_data) = (point_data[fixed[0]..].to_vec(), cell_data[fixed[1]..].to_vec());
+            let times = times.clone();
             let recorded = Piece { times, point_data, cell_data, ..Piece::default() };
             Standing { halt: halt(), rows: rows.clone(), recorded }
         })
@@ -281,10 +300,17 @@ pub fn solve_from(
     }
     let (piece, rows) = reached.into_inner();
 
+    if followed.failure.is_none() {
+        problem.commit(&followed.solution.u, &followed.solution.lambda);
+    }
+    let meshes = meshes::meshes(comm, scene, discrete);
+    let mesh_names = serde_json::to_string(&meshes).expect("names and numbers can be written");
+    let state = state::pack(&problem, meshes);
     let summary = summarise(scene, discrete, &followed, rows, comm);
     let records = Records {
-        provenance: provenance::collect(comm, &scene.to_toml(), shares, started),
+        provenance: provenance::collect(comm, &scene.to_toml(), &mesh_names, shares, started),
         convergence: convergence(&summary.newton),
+        state,
     };
     Ok(Solved { summary, piece, records, u: followed.solution.u, closed })
 }

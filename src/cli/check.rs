@@ -9,7 +9,7 @@ use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
 use crate::results::replace;
 use crate::results::summary::Summary;
-use crate::study;
+use crate::study::{self, StudyError};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -30,6 +30,9 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
         replace::probe(comm, file).map_err(Failure::Place)?;
     }
     let discrete = study::discretise(&scene, comm)?;
+    if let Some(initial) = &scene.initial {
+        study::earlier(comm, &scene, &discrete, initial).map_err(StudyError::from)?;
+    }
     let sizes = study::sizes(&discrete, comm);
     let memory = study::memory_estimate_mb(&scene, &discrete, comm);
     let warnings = warnings(&scene, &discrete, comm);

@@ -41,7 +41,7 @@ pub struct Resume {
 }
 
 /// What a checkpoint is written by; others are not understood.
-const FORMAT: &str = "fetiplast checkpoint 1";
+const FORMAT: &str = "fetiplast checkpoint 2";
 
 /// What a checkpoint says of its run.
 pub(super) fn labels(plan: &Plan, scene: &str) -> [(&'static str, String); 4] {

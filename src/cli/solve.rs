@@ -72,10 +72,11 @@ pub enum Cascade {
 }
 
 impl Cascade {
-    /// The levels to solve before `level`, coarsest first. None where there is a history: a coarser level knows its end.
+    /// The levels to solve before `level`, coarsest first. None where there is a history, of which a coarser
+    /// level knows the end, or an earlier state, which is of one mesh.
     fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
         let linear = scene.contact.is_empty() && scene.material.values().all(|m| m.yield_stress.is_none());
-        if self == Self::Off || !scene.step.is_empty() || (self == Self::Auto && linear) {
+        if self == Self::Off || !scene.step.is_empty() || scene.initial.is_some() || (self == Self::Auto && linear) {
             return Vec::new();
         }
         let half = |l: &usize| (*l > 1).then(|| l.div_ceil(2));
@@ -275,6 +276,9 @@ impl Run<'_> {
             let standing = timer.time("checkpoints", || unpack(comm, &discrete, &file));
             let standing = standing.and_then(|standing| file.close().map(|()| standing).map_err(Unfit::from));
             begin = Begin::At(Box::new(standing.map_err(unfit)?));
+        } else if let Some(initial) = &scene.initial {
+            let earlier = timer.time("initial state", || study::earlier(comm, scene, &discrete, initial));
+            begin = Begin::After(earlier.map_err(StudyError::from)?);
         }
         let pause = |standing: &dyn Fn() -> study::Standing| {
             keeper.pause(|path| {

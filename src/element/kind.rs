@@ -23,6 +23,15 @@ impl Kind {
         }
     }
 
+    /// Integration points of an element.
+    pub fn points(self) -> usize {
+        match self {
+            Self::Tet4 => 1,
+            Self::Tet10 => 4,
+            Self::Hex8 => 8,
+        }
+    }
+
     /// Local nodes of each face, counter-clockwise from outside: corners, then the middles of the edges between them.
     pub fn faces(self) -> &'static [&'static [usize]] {
         match self {

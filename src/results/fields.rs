@@ -31,18 +31,20 @@ pub struct ContactState {
 /// Mesh of a rank's subdomains, one behind the other, with the fields that never change.
 pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
     let mut piece = Piece { offsets: vec![0], ..Piece::default() };
-    let (mut subdomain_ids, mut bodies) = (Vec::new(), Vec::new());
+    let (mut subdomain_ids, mut bodies, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
     for subdomain in subdomains {
+        nodes.extend(subdomain.nodes.iter().map(|&node| node as i64));
         let first = piece.points.len() as u64;
         piece.points.extend(&subdomain.points);
-        for nodes in &subdomain.elements {
-            piece.connectivity.extend(nodes.iter().map(|&n| first + u64::from(n)));
+        for of_element in &subdomain.elements {
+            piece.connectivity.extend(of_element.iter().map(|&n| first + u64::from(n)));
             piece.offsets.push(piece.connectivity.len() as u64);
             piece.types.push(vtk_type(subdomain.elements.kind()));
             subdomain_ids.push(subdomain.id as i64);
             bodies.push(subdomain.body as i64);
         }
     }
+    piece.point_data = vec![Field::integer("node", nodes)];
     piece.cell_data = vec![
         Field::integer("body", bodies),
         Field::integer("rank", vec![rank as i64; subdomain_ids.len()]),

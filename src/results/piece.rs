@@ -3,7 +3,7 @@
 //! Numbering is the piece's own: connectivity counts from the piece's first point. The mesh stays, fields may change from
 //! one time to the next. No field is interpreted here.
 
-use crate::comm::Comm;
+use crate::comm::{Comm, all_gather_u64};
 
 /// An unstructured mesh with fields; a rank that owns nothing has no points and no cells, but the same fields.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,6 +55,11 @@ impl Field {
         Self { name: name.into(), components: 3, states: vec![Values::Real(values.as_flattened().to_vec())] }
     }
 
+    /// A field of `components` numbers a row.
+    pub fn of(name: &str, components: usize, values: Values) -> Self {
+        Self { name: name.into(), components, states: vec![values] }
+    }
+
     /// A field of one integer a row.
     pub fn integer(name: &str, values: Vec<i64>) -> Self {
         Self { name: name.into(), components: 1, states: vec![Values::Integer(values)] }
@@ -62,6 +67,21 @@ impl Field {
 }
 
 impl Field {
+    /// All ranks' rows one behind the other, on every rank. Collective; all ranks have the same states.
+    pub(super) fn gather(&self, comm: &dyn Comm) -> Self {
+        let states = self.states.iter().map(|state| match state {
+            Values::Real(values) => {
+                let bits: Vec<u64> = values.iter().map(|x| x.to_bits()).collect();
+                Values::Real(all_gather_u64(comm, &bits).into_iter().map(f64::from_bits).collect())
+            }
+            Values::Integer(values) => {
+                let bits: Vec<u64> = values.iter().map(|i| i.cast_unsigned()).collect();
+                Values::Integer(all_gather_u64(comm, &bits).into_iter().map(u64::cast_signed).collect())
+            }
+        });
+        Self { name: self.name.clone(), components: self.components, states: states.collect() }
+    }
+
     fn kind(&self) -> &'static str {
         self.states.first().map_or("empty", Values::kind)
     }

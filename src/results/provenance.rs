@@ -13,8 +13,14 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 pub const COMMIT: &str = env!("FETIPLAST_COMMIT");
 
 /// Names and texts of all that is known of this run; the same on every rank but for the command line. Collective.
-/// `scene` is the effective scene in TOML, `shares` the subdomains of each rank.
-pub fn collect(comm: &dyn Comm, scene: &str, shares: &Shares, started: SystemTime) -> Vec<(String, String)> {
+/// `scene` is the effective scene in TOML, `meshes` what tells its meshes apart, `shares` the subdomains of each rank.
+pub fn collect(
+    comm: &dyn Comm,
+    scene: &str,
+    meshes: &str,
+    shares: &Shares,
+    started: SystemTime,
+) -> Vec<(String, String)> {
     let (major, minor, patch) = hdf5_metno::library_version();
     let subdomains: Vec<String> = shares.0.iter().map(usize::to_string).collect();
     [
@@ -32,13 +38,14 @@ pub fn collect(comm: &dyn Comm, scene: &str, shares: &Shares, started: SystemTim
         ("start_time", utc(started)),
         ("slurm_job_id", std::env::var("SLURM_JOB_ID").unwrap_or_else(|_| "none".into())),
         ("scene_hash", hash(scene)),
+        ("mesh_hash", hash(meshes)),
         ("scene", scene.to_owned()),
     ]
     .map(|(name, text)| (name.to_owned(), text))
     .to_vec()
 }
 
-/// FNV-1a, 64 bit, in hexadecimal (Fowler, Noll, Vo; draft-eastlake-fnv): tells scenes apart, protects nothing.
+/// FNV-1a, 64 bit, in hexadecimal (Fowler, Noll, Vo; draft-eastlake-fnv): tells scenes and meshes apart, protects nothing.
 pub fn hash(text: &str) -> String {
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     format!("{:016x}", text.bytes().fold(0xcbf2_9ce4_8422_2325, step))
@@ -89,7 +96,7 @@ mod tests {
     #[test]
     fn every_rank_is_named() {
         let entries = threads::run(3, |comm| {
-            collect(comm, "title = \"a\"", &Shares(vec![2, 0, 1]), UNIX_EPOCH).into_iter().collect::<Vec<_>>()
+            collect(comm, "title = \"a\"", "", &Shares(vec![2, 0, 1]), UNIX_EPOCH).into_iter().collect::<Vec<_>>()
         });
         let text = |name: &str| entries[0].iter().find(|(n, _)| n == name).map(|(_, t)| t.clone()).unwrap();
         assert_eq!(text("subdomains_per_rank"), "2 0 1");

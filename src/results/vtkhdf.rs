@@ -23,6 +23,17 @@ pub struct Records {
     pub provenance: Vec<(String, String)>,
     /// Group `/convergence`: the columns of a table.
     pub convergence: Vec<(String, Vec<f64>)>,
+    /// Group `/state`: what another run can start from.
+    pub state: State,
+}
+
+/// What the material remembers at the end of a run.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// What the arrays belong to. Rank 0's counts.
+    pub description: String,
+    /// This rank's rows, one rank's behind the other's; the same names on every rank.
+    pub arrays: Vec<Field>,
 }
 
 impl Records {
@@ -30,7 +41,9 @@ impl Records {
         const DESCRIPTION: usize = 1024;
         let texts: usize = self.provenance.iter().map(|(_, text)| text.len() + DESCRIPTION).sum();
         let columns: usize = self.convergence.iter().map(|(_, column)| 8 * column.len() + DESCRIPTION).sum();
-        (texts + columns) as u64
+        let states = self.state.arrays.iter().flat_map(|field| &field.states);
+        let numbers: usize = states.map(|state| 8 * state.len() + DESCRIPTION).sum();
+        (texts + columns + numbers + self.state.description.len()) as u64
     }
 }
 
@@ -50,8 +63,11 @@ pub fn write(comm: &dyn Comm, path: &Path, piece: &Piece, records: &Records) -> 
             return write_rows(comm, temporary, piece, &[piece.sizes()], records);
         }
         let gathered = piece.gather(comm);
+        let arrays = records.state.arrays.iter().map(|field| field.gather(comm)).collect();
+        let state = State { description: records.state.description.clone(), arrays };
+        let records = Records { state, ..records.clone() };
         on_root(comm, "writing for all ranks", || match gathered {
-            Some((whole, sizes)) => write_rows(&Solo, temporary, &whole, &sizes, records),
+            Some((whole, sizes)) => write_rows(&Solo, temporary, &whole, &sizes, &records),
             None => Ok(()),
         })
     })
@@ -75,8 +91,10 @@ fn write_rows(
     for open in [SharedFile::create, SharedFile::reopen] {
         let file = open(comm, path)?;
         put_mesh(&file, rows, sizes)?;
-        put_fields(&file, "VTKHDF/PointData", &rows.point_data)?;
-        put_fields(&file, "VTKHDF/CellData", &rows.cell_data)?;
+        for (group, fields) in [("VTKHDF/PointData", &rows.point_data), ("VTKHDF/CellData", &rows.cell_data)] {
+            file.group(group)?;
+            put_fields(&file, group, fields)?;
+        }
         if rows.times.len() > 1 {
             put_steps(comm, &file, rows, sizes)?;
         }
@@ -101,7 +119,6 @@ fn put_mesh(file: &SharedFile, rows: &Piece, sizes: &[[usize; 3]]) -> Result<(),
 }
 
 fn put_fields(file: &SharedFile, group: &str, fields: &[Field]) -> Result<(), String> {
-    file.group(group)?;
     for Field { name, components, states } in fields {
         let name = format!("{group}/{name}");
         let real: Vec<&[f64]> = states.iter().filter_map(Values::real).collect();
@@ -154,7 +171,9 @@ fn put_records(comm: &dyn Comm, file: &SharedFile, records: &Records) -> Result<
         let mine = if comm.rank() == 0 { &records.convergence[column].1[..] } else { &[] };
         file.rows(&format!("convergence/{name}"), 1, mine)?;
     }
-    Ok(())
+    file.group("state")?;
+    file.text("state/description", &root_texts(comm, [&records.state.description[..]]).concat())?;
+    put_fields(file, "state", &records.state.arrays)
 }
 
 /// VTK's ids are signed.
@@ -200,7 +219,15 @@ mod tests {
         Records {
             provenance: vec![("scene".into(), "title = \"Blöcke\"\n".into()), ("empty".into(), String::new())],
             convergence: vec![("step".into(), vec![1.0, 2.0]), ("criterion".into(), vec![0.5, f64::NAN])],
+            state: State { description: "{}".into(), arrays: Vec::new() },
         }
+    }
+
+    /// A row for each cell.
+    fn state(piece: &Piece) -> State {
+        let kappa: Vec<f64> = piece.offsets[1..].iter().map(|end| piece.points[*end as usize - 1][1].cos()).collect();
+        let arrays = vec![Field::integer("point", vec![-3; kappa.len()]), Field::scalar("kappa", kappa)];
+        State { description: "{}".into(), arrays }
     }
 
     fn read_bits(file: &File, name: &str) -> Vec<u64> {
@@ -215,6 +242,7 @@ mod tests {
             let path = directory.path().join(format!("{ranks}.vtkhdf"));
             threads::run(ranks, |comm| {
                 let records = if comm.rank() == 0 { records() } else { Records::default() };
+                let records = Records { state: state(&piece(comm)), ..records };
                 write(comm, &path, &piece(comm), &records).unwrap();
             });
             let file = File::open(&path).unwrap();
@@ -230,9 +258,12 @@ mod tests {
                 "VTKHDF/PointData/contact_gap",
                 "VTKHDF/CellData/subdomain",
                 "convergence/criterion",
+                "state/point",
+                "state/kappa",
             ]
             .map(|name| read_bits(&file, name))
             .to_vec();
+            assert_eq!(numbers[6].len(), 15);
             assert_eq!(*first.get_or_insert(numbers.clone()), numbers);
             assert_eq!(file.dataset("VTKHDF/PointData/displacement").unwrap().shape(), [60, 3]);
         }

@@ -11,6 +11,7 @@ use super::contact::{Contact, Sides};
 use super::decomposition::Decomposition;
 use super::error::Fault;
 use super::held::Held;
+use super::initial::Initial;
 use super::load::Load;
 use super::mapped::{OF_CYLINDER, OF_SPHERE};
 use super::material::Material;
@@ -30,6 +31,7 @@ pub(super) fn scene(scene: &Scene) -> Checked {
     scene.support.iter().try_for_each(|(name, it)| support(scene, &format!("support.{name}"), it))?;
     scene.load.iter().try_for_each(|(name, it)| load(scene, &format!("load.{name}"), it))?;
     scene.contact.iter().try_for_each(|(name, it)| contact(scene, &format!("contact.{name}"), it))?;
+    scene.initial.iter().try_for_each(|it| initial(scene, it))?;
     scene.step.iter().enumerate().try_for_each(|(index, it)| step(scene, &format!("step.{index}"), it))?;
     decomposition(scene)?;
     solver(&scene.solver)?;
@@ -193,6 +195,15 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
     let twin = scene.contact.iter().take_while(|(_, earlier)| !std::ptr::eq(*earlier, contact)).find(same);
     let rule = |twin: &str| format!("contact.{twin} is between the same two surfaces; remove one of the two");
     twin.map_or(Ok(()), |(twin, _)| require(false, &key, other.to_string(), rule(twin)))
+}
+
+fn initial(scene: &Scene, Initial { result, bodies }: &Initial) -> Checked {
+    require(!result.is_empty(), "initial.result", result, "must be the path of a result file")?;
+    let Some(bodies) = bodies else { return Ok(()) };
+    let key = "initial.bodies";
+    require(!bodies.is_empty(), key, bodies, "name at least one body, or leave it out for all")?;
+    let stranger = bodies.iter().find(|name| !scene.body.contains_key(*name));
+    stranger.map_or(Ok(()), |name| require(false, key, name, known("body", scene.body.keys())))
 }
 
 fn step(scene: &Scene, key: &str, step: &Step) -> Checked {

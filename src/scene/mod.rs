@@ -13,6 +13,7 @@ mod contact;
 mod decomposition;
 mod error;
 mod held;
+mod initial;
 pub mod library;
 mod load;
 mod mapped;
@@ -34,6 +35,7 @@ pub use contact::{Contact, Obstacle, Sides};
 pub use decomposition::{Decomposition, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use held::Held;
+pub use initial::Initial;
 pub use load::Load;
 pub use mapped::{Cylinder, Grid, Sphere};
 pub use material::Material;
@@ -61,6 +63,9 @@ pub struct Scene {
     pub load: BTreeMap<String, Load>,
     /// Contacts by name.
     pub contact: BTreeMap<String, Contact>,
+    /// The state to start from; absent: rest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub initial: Option<Initial>,
     /// The load history as given; see [`Scene::steps`].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub step: Vec<Step>,

@@ -9,8 +9,9 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::meshes::fingerprints;
 use super::{Discrete, Standing};
-use crate::comm::{Comm, Shares, all_gather_u64};
+use crate::comm::{Comm, Shares};
 use crate::constraint::Row;
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
@@ -35,8 +36,8 @@ const RECORDED: &str = "state/recorded";
 /// What is not an array.
 #[derive(Serialize, Deserialize)]
 struct Numbers {
-    /// Fingerprint of the meshes.
-    mesh: u64,
+    /// Fingerprints of the bodies' meshes.
+    meshes: Vec<u64>,
     attempt: Attempt,
     sizes: Sizes,
     last: Option<Reached>,
@@ -84,7 +85,7 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         plastic_elements: solution.plastic_elements,
     };
     let numbers = Numbers {
-        mesh: fingerprint(comm, discrete),
+        meshes: fingerprints(comm, discrete),
         attempt,
         sizes: committed.sizes,
         last: last.as_ref().map(reached),
@@ -218,7 +219,7 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
     let json = |error: serde_json::Error| Unfit::Unreadable(format!("its numbers are not understood: {error}"));
     let numbers: Numbers = serde_json::from_str(&file.text(NUMBERS)?).map_err(json)?;
     let layout: Layout = serde_json::from_str(&file.text(RECORDED)?).map_err(json)?;
-    if numbers.mesh != fingerprint(comm, discrete) {
+    if numbers.meshes != fingerprints(comm, discrete) {
         return Err(Unfit::Mesh);
     }
     let space = RowSpace::new(comm, shares, constraints);
@@ -368,20 +369,4 @@ fn complete(comm: &dyn Comm, shares: &Shares, discrete: &Discrete, rows: &mut [[
         let of_blocks = blocks.into_iter().flat_map(|(_, block)| block);
         of_blocks.zip(answers.as_chunks::<3>().0).for_each(|(row, answer)| rows[row] = *answer);
     }
-}
-
-/// Tells meshes apart: all elements with their nodes and places, whatever subdomains and ranks they belong to. Collective.
-fn fingerprint(comm: &dyn Comm, discrete: &Discrete) -> u64 {
-    let mut mine = 0_u64;
-    for subdomain in &discrete.decomposition.subdomains {
-        for nodes in &subdomain.elements {
-            let mut hasher = crc32fast::Hasher::new();
-            for &node in nodes {
-                hasher.update(&subdomain.nodes[node as usize].to_le_bytes());
-                subdomain.points[node as usize].iter().for_each(|x| hasher.update(&x.to_le_bytes()));
-            }
-            mine = mine.wrapping_add(u64::from(hasher.finalize()));
-        }
-    }
-    all_gather_u64(comm, &[mine]).into_iter().fold(0, u64::wrapping_add)
 }

@@ -14,6 +14,7 @@ mod gmsh;
 mod hard;
 mod held;
 mod history;
+mod initial;
 mod loads;
 mod mortar;
 mod patch;

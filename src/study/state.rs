@@ -1,0 +1,239 @@
+//! The state of the material as it is kept in result files, and a start from one.
+//!
+//! A row for each integration point that has ever flowed: the first four nodes of its element, which tell elements apart,
+//! its number there, and what it remembers. Nodes count over all bodies of the scene that wrote them. So neither ranks nor
+//! subdomains matter, and bodies may be others, if only those that take their state have the same mesh. The displacement
+//! comes with it, from the last fields: equilibrium with that state does not depend on it, but is near.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::Discrete;
+use super::meshes::{MeshOf, meshes};
+use crate::comm::Comm;
+use crate::feti::Torn;
+use crate::material::History;
+use crate::newton::TornProblem;
+use crate::newton::committed::{Committed, Sizes};
+use crate::results::agree::{agree, on_root};
+use crate::results::hdf5::SharedFile;
+use crate::results::piece::{Field, Values};
+use crate::results::vtkhdf::State;
+use crate::scene::{Initial, Scene};
+
+/// What the rows belong to.
+#[derive(Serialize, Deserialize)]
+struct Description {
+    meshes: Vec<MeshOf>,
+    sizes: Sizes,
+}
+
+/// The state that a problem has committed.
+pub(super) fn pack(problem: &TornProblem, meshes: Vec<MeshOf>) -> State {
+    let (mut nodes, mut points, mut strains, mut kappas) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for (own, subdomain) in problem.subdomains.iter().enumerate() {
+        let of_element = subdomain.elements.kind().points();
+        for (index, history) in problem.committed.history(own).iter().enumerate() {
+            if *history != History::default() {
+                let element = subdomain.elements.get(index / of_element);
+                nodes.extend(key(element, &subdomain.nodes));
+                points.push((index % of_element) as i64);
+                strains.extend(history.plastic_strain);
+                kappas.push(history.kappa);
+            }
+        }
+    }
+    let description = Description { meshes, sizes: problem.committed.sizes };
+    let arrays = vec![
+        Field::of("nodes", 4, Values::Integer(nodes)),
+        Field::of("point", 1, Values::Integer(points)),
+        Field::of("plastic_strain", 6, Values::Real(strains)),
+        Field::of("kappa", 1, Values::Real(kappas)),
+    ];
+    State { description: serde_json::to_string(&description).expect("numbers and names can be written"), arrays }
+}
+
+/// What tells an element from others of its mesh.
+fn key(element: &[u32], nodes: &[u64]) -> [i64; 4] {
+    std::array::from_fn(|k| nodes[element[k] as usize] as i64)
+}
+
+/// Why a result file is no start for a scene; the same on every rank.
+#[derive(Debug, Error)]
+pub enum NoStart {
+    /// It is not there, or may not be read.
+    #[error("cannot read the result file {path}: {reason}")]
+    Missing {
+        /// Where it was sought.
+        path: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// It is something else.
+    #[error("initial.result = {path}: {reason}")]
+    Unfit {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// What a run starts from, instead of rest.
+pub struct Earlier {
+    /// What the material remembers.
+    pub committed: Committed,
+    /// The displacement it was reached at; zero in bodies that start from rest.
+    pub u: Torn,
+}
+
+/// The state that a scene wants to start from. Collective.
+///
+/// # Errors
+/// If its result file cannot be read, or is of other meshes.
+pub fn earlier(comm: &dyn Comm, scene: &Scene, discrete: &Discrete, initial: &Initial) -> Result<Earlier, NoStart> {
+    let path = scene.directory.join(&initial.result);
+    let shown = || path.display().to_string();
+    on_root(comm, "opening", || std::fs::File::open(&path).and_then(|file| file.metadata()).map(drop))
+        .map_err(|reason| NoStart::Missing { path: shown(), reason })?;
+    read(comm, scene, discrete, initial, &path).map_err(|reason| NoStart::Unfit { path: shown(), reason })
+}
+
+/// Rows that are read at once.
+const BLOCK: u64 = 1 << 16;
+
+fn read(
+    comm: &dyn Comm,
+    scene: &Scene,
+    discrete: &Discrete,
+    initial: &Initial,
+    path: &Path,
+) -> Result<Earlier, String> {
+    let file = SharedFile::reopen(comm, path)
+        .map_err(|_| "this is no result file: give the .vtkhdf that an earlier run wrote".to_owned())?;
+    let description = file.read_text("state/description").ok();
+    let description = description.and_then(|text| serde_json::from_str::<Description>(&text).ok());
+    let Some(Description { meshes: there, sizes }) = description else {
+        return Err("it has no state to start from: solve the scene that it is of again, with this program".into());
+    };
+    let here = meshes(comm, scene, discrete);
+    let mut taken = Taken { ranges: Vec::new() };
+    for (body, mesh) in here.iter().enumerate() {
+        if initial.bodies.as_ref().is_none_or(|wanted| wanted.contains(&mesh.body)) {
+            taken.ranges.push((same(mesh, &there)?, mesh.first_node, body));
+        }
+    }
+
+    let subdomains = &discrete.decomposition.subdomains;
+    let own = |body: usize| taken.ranges.iter().any(|(_, _, of)| *of == body);
+    let mut elements: HashMap<[i64; 4], (usize, usize)> = HashMap::new();
+    let mut copies: HashMap<i64, Vec<(usize, usize)>> = HashMap::new();
+    for (k, subdomain) in subdomains.iter().enumerate().filter(|(_, s)| own(s.body)) {
+        elements.extend(subdomain.elements.iter().enumerate().map(|(e, nodes)| (key(nodes, &subdomain.nodes), (k, e))));
+        subdomain.nodes.iter().enumerate().for_each(|(n, &node)| copies.entry(node as i64).or_default().push((k, n)));
+    }
+
+    let mut histories: Vec<Vec<History>> = vec![Vec::new(); subdomains.len()];
+    let rows = file.count("state/kappa")?;
+    let mut misfits = 0;
+    for block in blocks(0..rows) {
+        let (nodes, points) = (part::<i64>(&file, "state/nodes", &block)?, part::<i64>(&file, "state/point", &block)?);
+        let strains = part::<f64>(&file, "state/plastic_strain", &block)?;
+        let kappas = part::<f64>(&file, "state/kappa", &block)?;
+        let states = strains.as_chunks::<6>().0.iter().zip(kappas);
+        for ((nodes, point), (&plastic_strain, kappa)) in nodes.as_chunks::<4>().0.iter().zip(points).zip(states) {
+            let Some(&(k, element)) = taken.here(nodes).and_then(|nodes| elements.get(&nodes)) else { continue };
+            let of_element = subdomains[k].elements.kind().points();
+            let history = &mut histories[k];
+            history.resize(of_element * subdomains[k].elements.len(), History::default());
+            match history.get_mut(of_element * element..).and_then(|points| points.get_mut(point as usize)) {
+                Some(entry) if (point as usize) < of_element => *entry = History { plastic_strain, kappa },
+                _ => misfits += 1,
+            }
+        }
+    }
+
+    let mut u: Torn = subdomains.iter().map(|s| vec![0.0; s.dofs()]).collect();
+    let points = file.count("VTKHDF/PointData/node")?;
+    let states = file.count("VTKHDF/PointData/displacement")?;
+    let last = states.checked_sub(points).ok_or("it is damaged: it has fewer displacements than points")?;
+    for block in blocks(0..points) {
+        let nodes = part::<i64>(&file, "VTKHDF/PointData/node", &block)?;
+        let block = block.start + last..block.end + last;
+        let displacement = part::<f64>(&file, "VTKHDF/PointData/displacement", &block)?;
+        for (&node, moved) in nodes.iter().zip(displacement.as_chunks::<3>().0) {
+            // One of the copies there counts for all of them here.
+            let here = taken.here(&[node]).and_then(|[node]| copies.remove(&node));
+            for (k, n) in here.into_iter().flatten() {
+                u[k][3 * n..][..3].copy_from_slice(moved);
+            }
+        }
+    }
+    file.close()?;
+    let whole = misfits == 0 && copies.is_empty();
+    agree(
+        comm,
+        "the state",
+        if whole { Ok(()) } else { Err("it is damaged: nodes or integration points are missing") },
+    )?;
+    Ok(Earlier { committed: Committed { histories, sizes }, u })
+}
+
+/// The bodies that take their state from the file.
+struct Taken {
+    /// Numbers of the nodes there, the first number here, and the body's index.
+    ranges: Vec<(Range<i64>, u64, usize)>,
+}
+
+impl Taken {
+    /// Nodes of a body by their numbers here; `None` if the body is not taken.
+    fn here<const N: usize>(&self, there: &[i64; N]) -> Option<[i64; N]> {
+        let (range, first, _) = self.ranges.iter().find(|(range, ..)| range.contains(&there[0]))?;
+        Some(there.map(|node| node - range.start + *first as i64))
+    }
+}
+
+/// The numbers in a file of a body's nodes.
+fn same(mesh: &MeshOf, there: &[MeshOf]) -> Result<Range<i64>, String> {
+    let body = &mesh.body;
+    let Some(found) = there.iter().find(|of| of.body == *body) else {
+        let known = there.iter().map(|of| &of.body[..]).collect::<Vec<_>>().join(", ");
+        return Err(format!(
+            "it has no body {body}, but {known}: name in initial.bodies those that take their state from it"
+        ));
+    };
+    let name = |of: &MeshOf| format!("{:?}", of.element).to_lowercase();
+    if found.element != mesh.element {
+        return Err(format!(
+            "body {body} is of {} there and of {} here: states go from mesh to the same mesh",
+            name(found),
+            name(mesh)
+        ));
+    }
+    let sizes = |of: &MeshOf| (of.nodes, of.elements);
+    if sizes(found) != sizes(mesh) {
+        return Err(format!(
+            "body {body} has {} nodes and {} elements there, {} and {} here: states go from mesh to the same mesh",
+            found.nodes, found.elements, mesh.nodes, mesh.elements
+        ));
+    }
+    if found.fingerprint != mesh.fingerprint {
+        return Err(format!(
+            "nodes of body {body} are at other places there than here: states go from mesh to the same mesh"
+        ));
+    }
+    Ok(found.first_node as i64..(found.first_node + found.nodes) as i64)
+}
+
+fn blocks(rows: Range<u64>) -> impl Iterator<Item = Range<u64>> {
+    let end = rows.end;
+    rows.step_by(BLOCK as usize).map(move |begin| begin..end.min(begin + BLOCK))
+}
+
+fn part<T: crate::results::hdf5::Number>(file: &SharedFile, name: &str, rows: &Range<u64>) -> Result<Vec<T>, String> {
+    file.read(name, rows.start, rows.end - rows.start)
+}

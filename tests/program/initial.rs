@@ -1,0 +1,158 @@
+//! Runs that start from the result of an earlier one: they go on as one history would.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::common::fields::Fields;
+use crate::common::{Run, assert_refused, assert_scene_refused, check, solve, solve_tightly};
+use fetiplast::analytic::cycle::Cycle;
+use fetiplast::material::Material;
+use hdf5_metno::File;
+
+/// Two blocks in contact, coarse, and with both kinds of hardening.
+fn blocks(element: &str) -> Vec<String> {
+    let mut sets = vec!["material.upper.kinematic_hardening=5000".to_owned()];
+    for body in ["lower", "upper"] {
+        sets.push(format!("body.{body}.brick.cells=[5, 2, 2]"));
+        sets.push(format!("body.{body}.element={element}"));
+    }
+    sets
+}
+
+fn from(result: &Path) -> String {
+    format!("initial.result=\"{}\"", result.display())
+}
+
+/// Displacements by node, stress and plastic strain by the nodes of an element.
+type State = (BTreeMap<i64, [f64; 3]>, BTreeMap<Vec<i64>, [f64; 2]>);
+
+/// The last state of a file, whatever its subdomains.
+fn state(path: &Path) -> State {
+    let last = Fields::times(path).map_or(0, |times| times.len() - 1);
+    let fields = Fields::at(path, last);
+    let nodes = fields.integers_of_points("node");
+    let (stress, kappa) = (fields.of_elements("von_mises"), fields.of_elements("equivalent_plastic_strain"));
+    let states = stress.into_iter().zip(kappa).map(|(stress, kappa)| [stress, kappa]);
+    let elements = fields.elements.iter().map(|element| element.iter().map(|&point| nodes[point]).collect());
+    (nodes.iter().copied().zip(fields.displacement).collect(), elements.zip(states).collect())
+}
+
+/// Largest difference of values with the same key, relative to the largest value, by component.
+fn difference<K: Ord, const N: usize>(a: &BTreeMap<K, [f64; N]>, b: &BTreeMap<K, [f64; N]>) -> f64 {
+    assert!(a.keys().eq(b.keys()) && !a.is_empty());
+    let differences = (0..N).map(|k| {
+        let size = b.values().fold(0.0_f64, |size, value| size.max(value[k].abs()));
+        a.values().zip(b.values()).fold(0.0_f64, |worst, (a, b)| worst.max((a[k] - b[k]).abs())) / size
+    });
+    differences.fold(0.0, f64::max)
+}
+
+/// Pressed in one run and released in another, cut otherwise: as in one history, for every element.
+#[test]
+fn a_run_goes_on_from_the_result_of_another_as_one_history() {
+    for element in ["tet4", "hex8", "tet10"] {
+        let sets = blocks(element);
+        let solve = |ranks: usize, more: &[&str]| {
+            let sets: Vec<&str> = sets.iter().map(String::as_str).chain(more.iter().copied()).collect();
+            solve_tightly(ranks, "two-blocks", &sets)
+        };
+        let (four, seven) = ("decomposition.subdomains=4", "decomposition.subdomains=7");
+        let pressed = solve(2, &[four]);
+        let history = solve(1, &[four, "step=[{}, {amplitude=0.2}]"]);
+        let (moved, answers) = state(&history.result());
+        assert!(answers.values().any(|[_, kappa]| *kappa > 1e-4), "nothing flows");
+        let start = from(&pressed.result());
+        let released = [1, 2, 3].map(|ranks| solve(ranks, &[seven, "step=[{amplitude=0.2}]", &start]));
+        for run in &released {
+            let (moved_1, answers_1) = state(&run.result());
+            let errors = [difference(&moved_1, &moved), difference(&answers_1, &answers)];
+            assert!(errors.iter().all(|error| *error < 1e-10), "{element}: {errors:?}");
+        }
+        let bits = released.each_ref().map(|run| {
+            let mut bits = Fields::read(&run.result()).bits(&["VTKHDF/PointData", "VTKHDF/CellData", "convergence"]);
+            bits.retain(|(name, _)| name != "VTKHDF/CellData/rank");
+            let strain: Vec<f64> =
+                File::open(run.result()).unwrap().dataset("state/plastic_strain").unwrap().read_raw().unwrap();
+            bits.push(("strain".into(), strain.into_iter().map(f64::to_bits).collect()));
+            bits
+        });
+        assert!(bits[0] == bits[1] && bits[0] == bits[2], "{element}: bits depend on the ranks");
+    }
+}
+
+/// Cycles of a bar, a run for each half: strain and stress of the closed form all along.
+#[test]
+fn cycles_of_a_bar_may_be_taken_one_run_at_a_time() {
+    let hardening = ["material.steel.hardening=3000", "material.steel.kinematic_hardening=9000"];
+    let yield_stress = Some(450.0);
+    let material =
+        Material { yield_stress, hardening: 3000.0, kinematic_hardening: 9000.0, ..Material::elastic(210_000.0, 0.29) };
+    let mut exact = Cycle::new(material);
+    let mut before: Option<Run> = None;
+    for (stress, parts) in [(500.0, 2), (0.0, 3), (-620.0, 5), (300.0, 2), (0.0, 4)] {
+        exact.load(stress);
+        let (load, parts) = (format!("load.pull.traction.0={stress}"), format!("decomposition.subdomains={parts}"));
+        let start = before.as_ref().map(|run| from(&run.result()));
+        let sets = hardening.into_iter().chain([&load[..], &parts[..]]).chain(start.as_deref());
+        let run = solve_tightly(2, "bar", &sets.collect::<Vec<_>>());
+        let fields = Fields::read(&run.result());
+        let [along, across] = exact.uniaxial();
+        let errors = fields.displacement.iter().zip(&fields.points);
+        let errors = errors.flat_map(|(u, x)| [u[0] - along * x[0], u[1] - across * x[1], u[2] - across * x[2]]);
+        let worst = errors.fold(0.0_f64, |worst, error| worst.max(error.abs())) / (along.abs() * 1000.0);
+        assert!(worst < 1e-8, "displacement at {stress}: {worst:.1e}");
+        for kappa in fields.of_elements("equivalent_plastic_strain") {
+            assert!((kappa / exact.kappa - 1.0).abs() < 1e-8, "{kappa} at {stress}, not {}", exact.kappa);
+        }
+        before = Some(run);
+    }
+}
+
+#[test]
+fn bodies_that_are_not_named_start_from_rest() {
+    let sets = ["body.lower.brick.cells=[5, 2, 2]", "body.upper.brick.cells=[5, 2, 2]", "decomposition.subdomains=4"];
+    let pressed = solve(2, "two-blocks", &sets).converged();
+    let (start, step) = (from(&pressed.result()), "step=[{amplitude=0.01}]");
+    let run = solve(2, "two-blocks", &[&sets[..], &[step, &start, "initial.bodies=[\"upper\"]"]].concat()).converged();
+    let fields = [&pressed, &run].map(|run| Fields::read(&run.result()));
+    let of_body = |fields: &Fields, body: i64| -> Vec<f64> {
+        let bodies = fields.integers_of_elements("body").into_iter();
+        let kappa = fields.of_elements("equivalent_plastic_strain").into_iter();
+        kappa.zip(bodies).filter(|(_, of)| *of == body).map(|(kappa, _)| kappa).collect()
+    };
+    assert!(of_body(&fields[1], 0).iter().all(|kappa| *kappa == 0.0));
+    let (before, after) = (of_body(&fields[0], 1), of_body(&fields[1], 1));
+    assert!(before.iter().any(|kappa| *kappa > 1e-4));
+    assert!(before.iter().zip(&after).all(|(before, after)| (before - after).abs() < 1e-12), "nothing flows anew");
+}
+
+#[test]
+fn results_of_other_meshes_and_files_that_are_none_are_refused() {
+    let sets = ["body.bar.brick.cells=[3, 2, 2]", "decomposition.subdomains=2"];
+    let run = solve(1, "bar", &sets).converged();
+    let start = from(&run.result());
+    let refused = |more: &[&str], parts: &[&str]| {
+        assert_scene_refused("bar", &[&[&start[..]], more].concat(), 65, &[&["initial.result = "], parts].concat());
+    };
+    refused(&[sets[1], "body.bar.brick.cells=[4, 2, 2]"], &["body bar has 36 nodes and 72 elements there, 45 and 96"]);
+    refused(&[&sets[..], &["body.bar.element=hex8"]].concat(), &["body bar is of tet4 there and of hex8 here"]);
+    refused(&[&sets[..], &["body.bar.brick.size.2=501"]].concat(), &["nodes of body bar are at other places"]);
+    let strangers = ["initial.bodies=[\"bolt\"]", &start];
+    assert_scene_refused("bar", &strangers, 65, &["initial.bodies", "no such body: known are bar"]);
+    let of_blocks = solve(1, "patch", &[]).converged();
+    assert_scene_refused("bar", &[&from(&of_blocks.result())], 65, &["it has no body bar, but lower, upper"]);
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    let refused = |path: &Path, code: i32, parts: &[&str]| assert_scene_refused("bar", &[&from(path)], code, parts);
+    refused(&at("missing.vtkhdf"), 74, &["cannot read the result file", "missing.vtkhdf", "No such file"]);
+    std::fs::write(at("text"), "solid").unwrap();
+    refused(&at("text"), 65, &["this is no result file"]);
+    let bytes = std::fs::read(run.result()).unwrap();
+    std::fs::write(at("half"), &bytes[..bytes.len() / 2]).unwrap();
+    refused(&at("half"), 65, &["this is no result file"]);
+    std::fs::write(at("old.vtkhdf"), &bytes).unwrap();
+    File::open_rw(at("old.vtkhdf")).unwrap().unlink("state").unwrap();
+    refused(&at("old.vtkhdf"), 65, &["it has no state to start from"]);
+    let end = check(2, "bar", 1, &[&start, "body.bar.brick.cells=[4, 2, 2]"]);
+    assert_refused(&end, 65, &["body bar has 36 nodes"]);
+}
