@@ -4,6 +4,7 @@ pub mod checkpoint;
 mod conditions;
 mod contacts;
 mod discrete;
+mod held;
 mod meshes;
 mod report;
 mod sizes;
@@ -39,7 +40,6 @@ use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
 use crate::newton::loading::{self, Entry, Observer, Progress};
 use crate::newton::{self, Committed, Method, ProgramSettings, Settings, StepRecord, StepSolver, TornProblem, Watch};
-use crate::newton::{equilibrium, recover};
 use crate::qp::mprgp::Expansion;
 use crate::results::fields;
 use crate::results::piece::Piece;
@@ -49,6 +49,7 @@ use crate::results::vtkhdf::Records;
 use crate::scene::{self, Scene};
 pub use conditions::RightHandSides;
 pub use discrete::{Discrete, discretise, discretise_expecting};
+pub use held::held;
 pub use sizes::{memory_estimate_mb, sizes};
 pub use state::{Earlier, NoStart, earlier};
 
@@ -211,10 +212,7 @@ pub fn solve_from(
         sums: &sums,
         yields: discrete.materials.iter().any(|m| m.yield_stress.is_some()),
     };
-    let resultants = |stage: usize| recover::resultants(&problem, &coarse, &stages[stage].end.loads);
-    equilibrium::check(&coarse, &space, constraints, stages.len(), resultants)
-        .map_err(|unheld| StudyError::Unheld(report::unheld(scene, &unheld)))?;
-    timer.time("coarse set-up", || coarse.factorise())?;
+    timer.time("coarse set-up", || held::at_all_stages(scene, discrete, &mut coarse, &space, &modes, &stages))?;
     let solver = &scene.solver;
     let method = match (solver.qp, solver.expansion) {
         (scene::Qp::ActiveSet, _) => Method::ActiveSet,

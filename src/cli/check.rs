@@ -30,6 +30,7 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
         replace::probe(comm, file).map_err(Failure::Place)?;
     }
     let discrete = study::discretise(&scene, comm)?;
+    study::held(&scene, &discrete, comm)?;
     if let Some(initial) = &scene.initial {
         study::earlier(comm, &scene, &discrete, initial).map_err(StudyError::from)?;
     }

@@ -137,7 +137,7 @@ impl StepSolver<'_> {
     /// up to rounding.
     fn balance(&self, problem: &TornProblem, lambda: &[f64]) -> (Vec<f64>, bool) {
         let coarse = &self.projector.coarse;
-        let wanted = recover::resultants(problem, coarse, &problem.loads);
+        let wanted = recover::resultants(problem.subdomains, problem.modes, coarse, &problem.loads);
         let is_contact = |row: usize| problem.constraints.rows[row].is_inequality();
         let largest = |mine: f64| problem.space.maximum(mine);
         let mut lambda = lambda.to_vec();

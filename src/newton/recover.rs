@@ -4,13 +4,15 @@
 //! `a = (G G')^-1 G (c - B K^+ (f_k - B'lambda))` with `G` restricted to those rows; at the solution exactly.
 
 use super::problem::TornProblem;
+use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::coarse::{Coarse, MODES};
+use crate::feti::kernel::RigidModes;
 
-/// `R'f`, whole on every rank. One all-gather.
-pub fn resultants(problem: &TornProblem, coarse: &Coarse, forces: &Torn) -> Vec<f64> {
+/// `R'f` from own subdomains, whole on every rank. One all-gather.
+pub fn resultants(subdomains: &[Subdomain], modes: &[RigidModes], coarse: &Coarse, forces: &Torn) -> Vec<f64> {
     let mut mine = Vec::new();
-    for ((subdomain, modes), f) in problem.subdomains.iter().zip(problem.modes).zip(forces) {
+    for ((subdomain, modes), f) in subdomains.iter().zip(modes).zip(forces) {
         mine.extend(modes.resultants(&subdomain.points, f));
     }
     coarse.share(&mine)

@@ -270,7 +270,8 @@ impl<'a> StepSolver<'a> {
         let forces = problem.unbalance(state);
         let coarse = &self.projector.coarse;
         let warm = timer.time("coarse problem", || {
-            self.programs.start(&self.projector, rows, recover::resultants(problem, coarse, &forces))
+            let balance = recover::resultants(problem.subdomains, problem.modes, coarse, &forces);
+            self.programs.start(&self.projector, rows, balance)
         });
         let slack = problem.slack(u);
         let mut b = vec![0.0; rows];

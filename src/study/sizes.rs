@@ -41,6 +41,7 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
 }
 
 /// Memory that solving would take on all ranks together, in MiB: factors, tangents, multipliers and coarse problem.
+/// Factors that congruent elastic subdomains share are counted for each: a material that may yield shares none in the end.
 /// Subdomains of equal connectivity are analysed once. Collective.
 pub fn memory_estimate_mb(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> f64 {
     let Discrete { decomposition, constraints, .. } = discrete;

@@ -1,7 +1,9 @@
 //! Bodies that only contact holds: solved where loads press them against it, refused with the free motion where not.
 
 use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
-use crate::common::{assert_close, assert_scene_refused, number, scene_file, solve, solve_tightly, vector};
+use crate::common::{
+    self, assert_close, assert_scene_refused, check, number, scene_file, solve, solve_tightly, vector,
+};
 use serde_json::Value;
 
 const YOUNG: f64 = 210_000.0;
@@ -233,7 +235,12 @@ fn a_block_is_pushed_along_without_force() {
 #[test]
 fn bodies_that_loads_drive_away_are_refused_with_their_motion() {
     let pulled = guides(1) + "load.pull = { surface = 'b1.zmax', traction = [0, 0, 5] }\n";
-    assert_refused(&scene(1, &pulled, ""), &[], &["body.b1", "loads drive its translation along +z", "add a support"]);
+    let parts = ["body.b1", "loads drive its translation along +z", "add a support"];
+    assert_refused(&scene(1, &pulled, ""), &[], &parts);
+    // Not only where it is solved.
+    let directory = tempfile::tempdir().unwrap();
+    let checked = check(2, &scene_file(directory.path(), &scene(1, &pulled, "")), 1, &[]);
+    common::assert_refused(&checked, BAD_SCENE, &parts);
 
     // Without friction nothing holds a block sideways.
     let pushed = "support.y1 = { surface = 'b1.ymin', fix = ['y'] }\n\
