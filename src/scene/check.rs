@@ -176,8 +176,9 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
     let (first, second) = match &contact.sides {
         Sides::Named { .. } => ("slave", "master"),
         Sides::Either(_) => ("surfaces", "surfaces"),
-        Sides::Rigid { slave, obstacle } => {
+        Sides::Rigid { slave, obstacle, displacement } => {
             surface(scene, &format!("{key}.slave"), slave)?;
+            all_finite(&format!("{key}.displacement"), &displacement.unwrap_or_default())?;
             return obstacle.check(&format!("{key}.rigid"));
         }
     };
@@ -220,6 +221,14 @@ fn step(scene: &Scene, key: &str, step: &Step) -> Checked {
     for (name, &factor) in &step.support {
         let key = format!("{key}.support.{name}");
         require(scene.support.contains_key(name), &key, factor, known("support", scene.support.keys()))?;
+        finite(&key, factor)?;
+    }
+    for (name, &factor) in &step.contact {
+        let key = format!("{key}.contact.{name}");
+        let moves = |(_, contact): &(&String, &Contact)| contact.displacement() != [0.0; 3];
+        let moving: Vec<&String> = scene.contact.iter().filter(moves).map(|(name, _)| name).collect();
+        let rule = known("contact whose obstacle has a displacement", moving.iter().copied());
+        require(moving.contains(&name), &key, factor, rule)?;
         finite(&key, factor)?;
     }
     Ok(())

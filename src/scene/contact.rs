@@ -32,16 +32,26 @@ pub enum Sides {
     },
     /// Surfaces of two bodies, either of which may be the slave.
     Either([SurfaceName; 2]),
-    /// A surface, and an obstacle that neither moves nor deforms.
+    /// A surface, and an obstacle that does not deform.
     Rigid {
         /// The surface whose nodes are checked.
         slave: SurfaceName,
         /// What they must not enter.
         obstacle: Obstacle,
+        /// How far the obstacle is moved, if it is (length); steps have factors of it.
+        displacement: Option<[f64; 3]>,
     },
 }
 
 impl Contact {
+    /// How far its rigid obstacle is moved where steps have the factor one (length); zero for surfaces.
+    pub fn displacement(&self) -> [f64; 3] {
+        match self.sides {
+            Sides::Rigid { displacement, .. } => displacement.unwrap_or_default(),
+            Sides::Named { .. } | Sides::Either(_) => [0.0; 3],
+        }
+    }
+
     /// Every surface that takes part: both, or the slave of an obstacle.
     pub fn surfaces(&self) -> impl Iterator<Item = &SurfaceName> {
         let (first, second) = match &self.sides {
@@ -173,6 +183,7 @@ struct Section {
     gap: f64,
     clearance: Option<f64>,
     rigid: Option<Obstacle>,
+    displacement: Option<[f64; 3]>,
 }
 
 /// Keys of the section that contradict each other.
@@ -184,6 +195,10 @@ enum SectionError {
     ThreeSided,
     #[error("surfaces names both sides of a contact: remove slave, master and rigid, or name the sides by these alone")]
     NamedTwice,
+    #[error(
+        "displacement moves a rigid obstacle, and there is none: surfaces move with supports and loads of their bodies"
+    )]
+    NothingToMove,
     #[error("a contact needs a slave (a surface) with a master or a rigid obstacle, or two surfaces")]
     NoSlave,
 }
@@ -192,13 +207,16 @@ impl TryFrom<Section> for Contact {
     type Error = SectionError;
 
     fn try_from(section: Section) -> Result<Self, SectionError> {
-        let Section { slave, master, surfaces, gap, clearance, rigid } = section;
+        let Section { slave, master, surfaces, gap, clearance, rigid, displacement } = section;
+        if rigid.is_none() && displacement.is_some() {
+            return Err(SectionError::NothingToMove);
+        }
         let sides = match (surfaces, slave, master, rigid) {
             (Some(surfaces), None, None, None) => Sides::Either(surfaces),
             (Some(_), ..) => return Err(SectionError::NamedTwice),
             (None, None, ..) => return Err(SectionError::NoSlave),
             (None, Some(slave), Some(master), None) => Sides::Named { slave, master },
-            (None, Some(slave), None, Some(obstacle)) => Sides::Rigid { slave, obstacle },
+            (None, Some(slave), None, Some(obstacle)) => Sides::Rigid { slave, obstacle, displacement },
             (None, Some(_), None, None) => return Err(SectionError::OneSided),
             (None, Some(_), Some(_), Some(_)) => return Err(SectionError::ThreeSided),
         };
@@ -208,11 +226,13 @@ impl TryFrom<Section> for Contact {
 
 impl From<Contact> for Section {
     fn from(Contact { sides, gap, clearance }: Contact) -> Self {
-        let empty = Self { slave: None, master: None, surfaces: None, gap, clearance, rigid: None };
+        let empty = Self { slave: None, master: None, surfaces: None, gap, clearance, rigid: None, displacement: None };
         match sides {
             Sides::Named { slave, master } => Self { slave: Some(slave), master: Some(master), ..empty },
             Sides::Either(surfaces) => Self { surfaces: Some(surfaces), ..empty },
-            Sides::Rigid { slave, obstacle } => Self { slave: Some(slave), rigid: Some(obstacle), ..empty },
+            Sides::Rigid { slave, obstacle, displacement } => {
+                Self { slave: Some(slave), rigid: Some(obstacle), displacement, ..empty }
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The load history: what part of the loads and prescribed displacements acts at the end of each step.
+//! The load history: what part of the loads and prescribed displacements (of supports and obstacles) acts at the end of each step.
 
 use std::collections::BTreeMap;
 
@@ -21,6 +21,8 @@ pub struct Step {
     pub load: BTreeMap<String, f64>,
     /// Factors of some supports' displacements, by name, instead of `amplitude`.
     pub support: BTreeMap<String, f64>,
+    /// Factors of the displacements of some contacts' obstacles, by name, instead of `amplitude`.
+    pub contact: BTreeMap<String, f64>,
 }
 
 /// The history of a scene that gives none: everything at once.
@@ -38,6 +40,7 @@ impl Step {
             halvings,
             load: BTreeMap::new(),
             support: BTreeMap::new(),
+            contact: BTreeMap::new(),
         }
     }
 
@@ -49,6 +52,11 @@ impl Step {
     /// Factor of this support's displacement at the end of the step.
     pub fn of_support(&self, name: &str) -> f64 {
         self.support.get(name).copied().unwrap_or(self.amplitude)
+    }
+
+    /// Factor of the displacement of this contact's obstacle at the end of the step.
+    pub fn of_contact(&self, name: &str) -> f64 {
+        self.contact.get(name).copied().unwrap_or(self.amplitude)
     }
 }
 

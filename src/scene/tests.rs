@@ -435,6 +435,35 @@ fn steps_are_checked() {
 }
 
 #[test]
+fn only_obstacles_are_moved_by_contacts() {
+    let plane = |more: &str| {
+        format!("contact.floor={{slave='block.zmin', rigid={{plane={{point=[0, 0, 0], normal=[0, 0, 1]}}}}{more}}}")
+    };
+    let step = "step=[{amplitude=0, contact={floor=2}}]";
+    let moved = one(&[&plane(", displacement=[0, 0, 1]"), step]).unwrap();
+    assert_eq!(moved.contact["floor"].displacement(), [0.0, 0.0, 1.0]);
+    assert_eq!((moved.step[0].of_contact("floor"), moved.step[0].of_contact("other")), (2.0, 0.0));
+    assert_eq!(Scene::from_text(&moved.to_toml(), "again.toml", 1, &[]).unwrap().contact, moved.contact);
+    assert_eq!(one(&[&plane("")]).unwrap().contact["floor"].displacement(), [0.0; 3]);
+    refuses(&[&plane(""), step], &["step.0.contact.floor", "no such contact whose obstacle has a displacement"]);
+    refuses(&[&plane(", displacement=[0, inf, 1]")], &["contact.floor.displacement", "finite"]);
+    assert_says(two_blocks(&["contact.joint.displacement=[0, 0, 1]"]), &["displacement moves a rigid obstacle"]);
+}
+
+#[test]
+fn the_state_to_start_from_is_checked() {
+    let start = |text: &str| one(&[&format!("initial={text}")]);
+    let scene = start("{result='out/earlier.vtkhdf', bodies=['block']}").unwrap();
+    assert_eq!(Scene::from_text(&scene.to_toml(), "again.toml", 1, &[]).unwrap().initial, scene.initial);
+    assert_eq!(one(&[]).unwrap().initial, None);
+    assert_says(start("{result=''}"), &["initial.result", "path of a result file"]);
+    assert_says(start("{}"), &["missing key `result`"]);
+    assert_says(start("{result='a', step=1}"), &["unknown key `step`"]);
+    assert_says(start("{result='a', bodies=[]}"), &["initial.bodies = []", "at least one"]);
+    assert_says(start("{result='a', bodies=['bolt']}"), &["initial.bodies = \"bolt\"", "known are block"]);
+}
+
+#[test]
 fn steps_scale_what_they_do_not_name_by_their_amplitude() {
     let scene = one(&["step=[{amplitude=2, support={base=3}}, {}]"]).unwrap();
     let [first, second] = scene.steps() else { panic!("two steps") };

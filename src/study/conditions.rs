@@ -5,12 +5,13 @@ use super::discrete::Discrete;
 use crate::assembly::loads::{self, Load};
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{ConstraintError, Constraints, Support};
+use crate::contact::surface::dot;
 use crate::contact::{ContactError, ContactPair};
 use crate::decomposition::Decomposition;
 use crate::feti::Torn;
 use crate::newton::loading::{Conditions, Stage};
 use crate::results::agree::agree;
-use crate::scene::Scene;
+use crate::scene::{Contact, Scene, Step};
 
 /// Right-hand sides of a rank's rows.
 pub struct RightHandSides {
@@ -39,28 +40,42 @@ pub(super) fn constraints(
     comm: &dyn Comm,
     &Given { decomposition, supports, contacts, pairs }: &Given,
 ) -> Result<(Constraints, RightHandSides), StudyError> {
-    let rows = |factor: &dyn Fn(&str) -> f64| {
-        let scaled = |s: &Support| Support { displacement: s.displacement.map(|d| factor(&s.name) * d), ..s.clone() };
+    // At rest without a step.
+    let rows = |step: Option<&Step>| {
+        let factor = |s: &Support| step.map_or(0.0, |step| step.of_support(&s.name));
+        let scaled = |s: &Support| Support { displacement: s.displacement.map(|d| factor(s) * d), ..s.clone() };
         let supports: Vec<Support> = supports.iter().map(scaled).collect();
-        let rows: Result<_, ConstraintError> = Constraints::new(comm, decomposition, &supports, pairs);
+        let pairs: Vec<ContactPair> = pairs.iter().map(|pair| moved(scene, pair, step)).collect();
+        let rows: Result<_, ConstraintError> = Constraints::new(comm, decomposition, &supports, &pairs);
         let rows = agree(comm, "supports", rows).map_err(StudyError::Supports)?;
-        refuse_held(comm, contacts, pairs, &rows)?;
+        refuse_held(comm, contacts, &pairs, &rows)?;
         Ok::<_, StudyError>(rows)
     };
     let right_hand_sides = |rows: &Constraints| rows.rows.iter().map(|row| row.rhs).collect::<Vec<f64>>();
     let steps = scene.steps();
-    let constraints = rows(&|name| steps[0].of_support(name))?;
+    let constraints = rows(Some(&steps[0]))?;
     let first = right_hand_sides(&constraints);
-    if scene.step.is_empty() || supports.iter().all(|s| s.displacement == [0.0; 3]) {
+    let displacements = supports.iter().map(|s| s.displacement);
+    let mut displacements = displacements.chain(scene.contact.values().map(Contact::displacement));
+    if scene.step.is_empty() || displacements.all(|displacement| displacement == [0.0; 3]) {
         let (begin, ends) = (first.clone(), vec![first; steps.len()]);
         return Ok((constraints, RightHandSides { begin, ends }));
     }
-    let begin = right_hand_sides(&rows(&|_| 0.0)?);
+    let begin = right_hand_sides(&rows(None)?);
     let mut ends = vec![first];
     for step in &steps[1..] {
-        ends.push(right_hand_sides(&rows(&|name| step.of_support(name))?));
+        ends.push(right_hand_sides(&rows(Some(step))?));
     }
     Ok((constraints, RightHandSides { begin, ends }))
+}
+
+/// A pair whose obstacle is where it is at the end of a step, or at rest: the plane that a node keeps clear of goes along.
+fn moved(scene: &Scene, pair: &ContactPair, step: Option<&Step>) -> ContactPair {
+    let (name, contact) = scene.contact.iter().nth(pair.contact).expect("a pair belongs to a contact");
+    let mut pair = pair.clone();
+    let away = dot(pair.normal, contact.displacement());
+    pair.widen(away * step.map_or(0.0, |step| step.of_contact(name)));
+    pair
 }
 
 /// Overlap, in diameters of a slave node's share of the surface, that may remain where supports hold both sides.

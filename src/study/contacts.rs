@@ -34,7 +34,7 @@ pub(super) fn pair(
                 let (slave, master) = if slave == 0 { (one, other) } else { (other, one) };
                 (slave, Some(master), pairs, rule_name(rule))
             }
-            Sides::Rigid { slave, obstacle } => {
+            Sides::Rigid { slave, obstacle, .. } => {
                 let surface = gather(slave);
                 let pairs = rigid::pair(number, name, &surface, obstacle)?;
                 let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);

@@ -3,6 +3,8 @@
 
 use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
 use crate::common::{assert_close, assert_near, assert_residuals, scene_file, solve, solve_tightly, vector};
+use fetiplast::analytic::cycle::Cycle;
+use fetiplast::material::Material;
 
 const YOUNG: f64 = 210_000.0;
 const POISSON: f64 = 0.29;
@@ -80,6 +82,54 @@ fn a_cube_on_a_plane_or_a_flat_height_field_is_in_the_state_of_the_closed_form()
         &["solver.preconditioner=lumped"],
     );
     assert_floor("plane = { point = [0.0, 0.0, 1.5], normal = [0.0, 0.0, 1.0] }", &["contact.floor.gap=2"]);
+}
+
+/// A floor that comes up, goes away, and comes again: what is left of the height is the plastic strain.
+#[test]
+fn a_moving_floor_presses_and_lets_go() {
+    let rest = r#"
+        [support.back]
+        surface = "cube.xmin"
+        fix = ["x"]
+        [support.side]
+        surface = "cube.ymin"
+        fix = ["y"]
+        [support.top]
+        surface = "cube.zmax"
+        fix = ["z"]
+        [contact.floor]
+        slave = "cube.zmin"
+        rigid = { plane = { point = [0.0, 0.0, -0.5], normal = [0.0, 0.0, 1.0] } }
+        displacement = [3.0, 0.0, 5.0]
+        [[step]]
+        increments = 2
+        [[step]]
+        amplitude = 0.0
+        [[step]]
+        amplitude = 0.3
+        contact = { floor = 0.8 }"#;
+    let directory = tempfile::tempdir().unwrap();
+    let run = solve_tightly(2, &scene_file(directory.path(), &cube(rest)), &[]);
+    let material = Material { yield_stress: Some(450.0), hardening: 1e4, ..Material::elastic(YOUNG, POISSON) };
+    let mut exact = Cycle::new(material);
+    for (state, factor) in [(1, 1.0), (2, 0.0), (3, 0.8)] {
+        // The floor carries no tension.
+        let height = 5.0 * factor - 0.5;
+        exact.stretch((-height / 1000.0_f64).min(exact.plastic));
+        let gap = if exact.stress < 0.0 { 0.0 } else { -1000.0 * exact.plastic - height };
+        let fields = Fields::at(&run.result(), state);
+        let [along, across] = exact.uniaxial();
+        assert_displacement(&fields, |node| {
+            let [x, y, z] = fields.points[node];
+            [across * x, across * y, along * (z - 1000.0)]
+        });
+        let gaps = fields.of_points("contact_gap").into_iter().filter(|gap| gap.is_finite());
+        assert_uniform("gap", gaps, gap, 5.0);
+        assert_uniform("von Mises stress", fields.of_elements("von_mises"), -exact.stress, 450.0);
+        let force = vector(&run.summary()["steps"][state]["contact_forces"]["floor"]);
+        assert_uniform("force", [force[2]], -exact.stress * 1e6, 450.0 * 1e6);
+    }
+    assert!(exact.plastic < -2e-3 && exact.stress < -200.0);
 }
 
 /// The loads press a cube into a corner; it has no supports, and its edges and a vertex are in several contacts.
