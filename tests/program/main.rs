@@ -15,6 +15,7 @@ mod hard;
 mod held;
 mod history;
 mod initial;
+mod library;
 mod loads;
 mod mortar;
 mod patch;
