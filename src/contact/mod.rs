@@ -81,15 +81,6 @@ pub enum ContactError {
         /// Name of the contact in the scene.
         name: String,
     },
-    /// Quadratic elements, and nodes or faces that do not coincide.
-    #[error(
-        "contact.{name}: the meshes of its surfaces do not match, which element = \"tet10\" cannot have in contact: make nodes and \
-         faces of both coincide, or take element = \"hex8\" or \"tet4\""
-    )]
-    NotMatching {
-        /// Name of the contact in the scene.
-        name: String,
-    },
     /// The surfaces do not face each other anywhere.
     #[error(
         "contact.{name}: no node of the slave surface has the master surface opposite along its normal; \

@@ -13,6 +13,11 @@
 //!
 //! Slave nodes whose normal direction supports hold carry no condition: rows stay independent. Nor do nodes without a
 //! master triangle opposite.
+//!
+//! Quadratic faces carry conditions at their corners only, with the dual functions of the linear functions there and the
+//! integrals of products with all quadratic ones on either side (Popp, Wohlmuth, Gee and Wall 2012, "quadratic-linear"): the
+//! multipliers still add up to one, so a constant pressure acts on corners and middles as it should. Such a face is four
+//! triangles through its middles, which are the geometry; its functions are those of its own coordinates.
 
 use std::collections::BTreeMap;
 
@@ -32,12 +37,69 @@ const SLIVER: f64 = 1e-12;
 /// Share of its surface that a slave node must have opposite a master.
 const COVERED: f64 = 1e-6;
 
+/// The same share with quadratic functions, of which those of corners are negative in places.
+const COVERED_QUADRATIC: f64 = 0.01;
+
 /// Overlap, in diameters of the smaller surface's bounding box, from which triangles are taken for two far sides.
 const DEEPEST: f64 = 0.125;
 
-/// What faces one slave triangle: points of integration with their share of the area, the slave's functions there, and the
-/// master's nodes with theirs.
-type Points = Vec<(f64, [f64; 3], [usize; 3], [f64; 3])>;
+/// What faces one slave face: points of integration.
+type Points = Vec<IntegrationPoint>;
+
+/// A point where both sides are compared.
+struct IntegrationPoint {
+    /// Its share of the slave's area.
+    area: f64,
+    /// Where it is between the corners of the slave's face.
+    at: [f64; 3],
+    /// The master's nodes with their functions there.
+    masters: Vec<(usize, f64)>,
+}
+
+/// Middles of the edges of a triangle: exact for squares.
+const MIDDLES: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+
+/// Corners of the triangles that a quadratic face is cut into, between the corners of the face.
+const PARTS: [[[f64; 3]; 3]; 4] = [
+    [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.5, 0.0, 0.5]],
+    [[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 0.5]],
+    [[0.5, 0.0, 0.5], [0.0, 0.5, 0.5], [0.0, 0.0, 1.0]],
+    [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]],
+];
+
+/// A face of a surface: its nodes, corners first, and its triangles.
+struct Face<'a> {
+    nodes: &'a [usize],
+    triangles: std::ops::Range<usize>,
+}
+
+/// Faces of a surface, all linear or all quadratic.
+fn faces(surface: &GatheredSurface) -> impl Iterator<Item = Face<'_>> {
+    let linear = if surface.quadratic.is_empty() { &surface.triangles[..] } else { &[] };
+    let linear = linear.iter().enumerate().map(|(k, nodes)| Face { nodes, triangles: k..k + 1 });
+    let quadratic = surface.quadratic.iter().enumerate();
+    linear.chain(quadratic.map(|(k, nodes)| Face { nodes, triangles: 4 * k..4 * k + 4 }))
+}
+
+/// A place in a triangle as one in the face that it is part of.
+fn in_face(surface: &GatheredSurface, triangle: usize, at: [f64; 3]) -> [f64; 3] {
+    if surface.quadratic.is_empty() {
+        return at;
+    }
+    let corners = &PARTS[triangle % 4];
+    std::array::from_fn(|a| (0..3).map(|k| at[k] * corners[k][a]).sum())
+}
+
+/// Nodes and functions of a face at a place in it.
+fn functions(nodes: &[usize], at: [f64; 3]) -> Vec<(usize, f64)> {
+    let [p, q, r] = at;
+    if nodes.len() == 3 {
+        return nodes.iter().copied().zip(at).collect();
+    }
+    let corners = at.map(|x| x * (2.0 * x - 1.0));
+    let middles = [4.0 * p * q, 4.0 * q * r, 4.0 * r * p];
+    nodes.iter().copied().zip(corners.into_iter().chain(middles)).collect()
+}
 
 /// The sums of one slave node's condition.
 #[derive(Default)]
@@ -62,21 +124,38 @@ pub fn pair(
     held: &[[bool; 3]],
 ) -> Result<Vec<ContactPair>, ContactError> {
     let normals = slave.normals_and_areas();
-    let active: Vec<bool> = normals.iter().zip(held).map(|((normal, _), held)| !is_held(*normal, *held)).collect();
+    let mut active: Vec<bool> = normals.iter().zip(held).map(|((normal, _), held)| !is_held(*normal, *held)).collect();
     let opposite = Opposite::new(slave, master);
-    let mut sums: BTreeMap<usize, Sums> = BTreeMap::new();
-    let mut faces = false;
-    for (triangle, corners) in slave.triangles.iter().zip(slave.corners()) {
-        let points = opposite.points(&corners);
-        faces |= !points.is_empty();
-        let Some(along) = surface::normal(&corners) else { continue };
-        let cosines = triangle.map(|node| dot(normals[node].0, along));
-        add(&mut sums, triangle, triangle.map(|node| active[node]), cosines, &points);
+    let corners: Vec<_> = slave.corners().collect();
+    let points = |Face { triangles, .. }: &Face| -> Points {
+        triangles.clone().flat_map(|k| opposite.points(slave, k, &corners[k])).collect()
+    };
+    let seen = faces(slave).map(|face| (face.nodes, points(&face))).filter(|(_, points)| !points.is_empty());
+    let seen: Vec<(&[usize], Points)> = seen.collect();
+    if seen.is_empty() {
+        return Err(ContactError::Apart { name: name.to_owned() });
     }
-    sums.retain(|&node, sums| sums.own > COVERED * normals[node].1);
+    let sums = loop {
+        let mut sums: BTreeMap<usize, Sums> = BTreeMap::new();
+        for (face, points) in &seen {
+            let corners = [0, 1, 2].map(|k| face[k]);
+            let Some(along) = surface::normal(&corners.map(|node| slave.points[node])) else { continue };
+            let cosines = corners.map(|node| dot(normals[node].0, along));
+            add(&mut sums, face, corners.map(|node| active[node]), cosines, points);
+        }
+        let least = if slave.quadratic.is_empty() { COVERED } else { COVERED_QUADRATIC };
+        let before = sums.len();
+        sums.retain(|&node, sums| {
+            active[node] = sums.own > least * normals[node].1;
+            active[node]
+        });
+        // What the others get of such nodes keeps constant pressures; of linear ones it is round-off.
+        if slave.quadratic.is_empty() || sums.len() == before || sums.is_empty() {
+            break sums;
+        }
+    };
     if sums.is_empty() {
-        let name = name.to_owned();
-        return Err(if faces { ContactError::AllHeld { name } } else { ContactError::Apart { name } });
+        return Err(ContactError::AllHeld { name: name.to_owned() });
     }
     let condition = |(node, sums): (usize, Sums)| {
         let normal = normals[node].0;
@@ -105,31 +184,37 @@ fn is_held(normal: [f64; 3], held: [bool; 3]) -> bool {
     left < 1e-16
 }
 
-/// Adds what one triangle gives to the sums of its active corners; `cosines` are those between its normal and the nodes'.
-fn add(sums: &mut BTreeMap<usize, Sums>, triangle: &[usize; 3], active: [bool; 3], cosines: [f64; 3], points: &Points) {
+/// Adds what one face gives to the sums of its active corners; `cosines` are those between its normal and theirs.
+fn add(sums: &mut BTreeMap<usize, Sums>, face: &[usize], active: [bool; 3], cosines: [f64; 3], points: &Points) {
     if points.is_empty() || !active.contains(&true) {
         return;
     }
     let mut mass = [[0.0; 3]; 3];
-    for (area, phi, _, _) in points {
+    for IntegrationPoint { area, at, .. } in points {
         for k in 0..3 {
-            (0..3).for_each(|l| mass[k][l] += area * phi[k] * phi[l]);
+            (0..3).for_each(|l| mass[k][l] += area * at[k] * at[l]);
         }
     }
     let found = dual::functions(&mass, active);
     for j in (0..3).filter(|&j| active[j]) {
-        let of_node = sums.entry(triangle[j]).or_default();
-        of_node.own += found.slave[j][j];
-        of_node.area += cosines[j] * found.slave[j][j];
-        for k in (0..3).filter(|&k| !active[k]) {
-            *of_node.slaves.entry(triangle[k]).or_default() += found.slave[j][k];
-        }
-        for (area, phi, nodes, of_master) in points {
-            let psi = dot(found.functions[j], *phi);
-            for (node, value) in nodes.iter().zip(of_master) {
-                *of_node.masters.entry(*node).or_default() += area * psi * value;
+        let of_node = sums.entry(face[j]).or_default();
+        let mut slaves = match face {
+            [_, _, _] => (0..3).map(|k| (face[k], found.slave[j][k])).filter(|(_, sum)| *sum != 0.0).collect(),
+            _ => BTreeMap::new(),
+        };
+        for IntegrationPoint { area, at, masters } in points {
+            let psi = area * dot(found.functions[j], *at);
+            for (node, value) in masters {
+                *of_node.masters.entry(*node).or_default() += psi * value;
+            }
+            if face.len() > 3 {
+                functions(face, *at).into_iter().for_each(|(k, value)| *slaves.entry(k).or_default() += psi * value);
             }
         }
+        let own = slaves.remove(&face[j]).unwrap_or_default();
+        slaves.into_iter().for_each(|(k, sum)| *of_node.slaves.entry(k).or_default() += sum);
+        of_node.own += own;
+        of_node.area += cosines[j] * own;
     }
 }
 
@@ -142,6 +227,8 @@ struct Opposite<'a> {
     deepest: f64,
     /// How much a piece of a slave and a master triangle counts.
     share: f64,
+    /// Where pieces are integrated, with shares of their area.
+    rule: Vec<(f64, [f64; 3])>,
 }
 
 impl<'a> Opposite<'a> {
@@ -150,11 +237,24 @@ impl<'a> Opposite<'a> {
         let normals = corners.iter().map(surface::normal).collect();
         let deepest = DEEPEST * slave.diameter().min(master.diameter());
         let share = slave.share * master.share;
-        Self { tree: BallTree::new(&corners), master, corners, normals, deepest, share }
+        let rule = if slave.quadratic.is_empty() && master.quadratic.is_empty() {
+            MIDDLES.map(|at| (1.0 / 3.0, at)).to_vec()
+        } else {
+            surface::quartic().collect()
+        };
+        Self { tree: BallTree::new(&corners), master, corners, normals, deepest, share, rule }
     }
 
-    /// Points of integration on the part of a slave triangle that faces the master surface.
-    fn points(&self, slave: &[[f64; 3]; 3]) -> Points {
+    /// Nodes of the face that a master triangle is part of.
+    fn nodes_of(&self, triangle: usize) -> &[usize] {
+        match self.master.quadratic.get(triangle / 4) {
+            Some(face) => face,
+            None => &self.master.triangles[triangle],
+        }
+    }
+
+    /// Points of integration on the part of triangle number `own` of the slave that faces the master surface.
+    fn points(&self, surface: &GatheredSurface, own: usize, slave: &[[f64; 3]; 3]) -> Points {
         let Some(normal) = surface::normal(slave) else { return Vec::new() };
         let plane = Plane::new(slave, normal);
         let flat = slave.map(|corner| plane.project(corner));
@@ -177,18 +277,17 @@ impl<'a> Opposite<'a> {
                 if area <= SLIVER * whole {
                     continue;
                 }
-                let at = |i: usize| {
-                    let p = [0, 1].map(|x| 0.5 * (part[i][x] + part[(i + 1) % 3][x]));
-                    (
-                        self.share * area / 6.0,
-                        barycentric(&flat, p),
-                        self.master.triangles[index],
-                        barycentric(&[a, b, c], p),
-                    )
-                };
-                let piece = [0, 1, 2].map(at);
-                if piece.iter().all(|(_, _, _, values)| dot(*values, heights) >= -self.deepest) {
-                    points.extend(piece);
+                let places = self.rule.iter().map(|(share, at)| {
+                    let p = [0, 1].map(|x| (0..3).map(|k| at[k] * part[k][x]).sum());
+                    (0.5 * self.share * area * share, barycentric(&flat, p), barycentric(&[a, b, c], p))
+                });
+                let places: Vec<_> = places.collect();
+                if places.iter().all(|(_, _, of_master)| dot(*of_master, heights) >= -self.deepest) {
+                    points.extend(places.into_iter().map(|(area, of_slave, of_master)| IntegrationPoint {
+                        area,
+                        at: in_face(surface, own, of_slave),
+                        masters: functions(self.nodes_of(index), in_face(self.master, index, of_master)),
+                    }));
                 }
             }
         }

@@ -22,7 +22,7 @@ pub type HeldNodes<'a> = &'a dyn Fn(&[u64]) -> Vec<[bool; 3]>;
 /// Conditions of contact number `contact`, ascending by slave node. Collective.
 ///
 /// # Errors
-/// If the surfaces do not face each other, or supports hold all slave nodes that do, or quadratic faces do not match.
+/// If the surfaces do not face each other, or supports hold all slave nodes that do.
 pub fn pair(
     contact: usize,
     name: &str,
@@ -38,8 +38,7 @@ pub fn pair(
             let gap = |pair: &ContactPair, along| quadratic::distance(slave, master, pair, along);
             Ok((quadratic::conditions(slave, pairs, gap), Rule::NodeToNode))
         }
-        (_, [true, _] | [_, true]) => Err(ContactError::NotMatching { name: name.to_owned() }),
-        (None, [false, false]) => Ok((mortar::pair(contact, name, slave, master, &held(&slave.nodes))?, Rule::Mortar)),
+        _ => Ok((mortar::pair(contact, name, slave, master, &held(&slave.nodes))?, Rule::Mortar)),
     }
 }
 

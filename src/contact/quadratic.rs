@@ -9,8 +9,8 @@
 //!
 //! Then the coefficient of a corner is its displacement, that of the middle `m` of the edge `a b` is
 //! `(u_m - s (u_a + u_b)) / (1 - 2 s)`, and with multipliers dual to that basis there is one condition a coefficient. All
-//! multipliers are forces of the same sense, and a constant pressure passes exactly where meshes match. Nodes meet nodes:
-//! meshes that do not match are refused.
+//! multipliers are forces of the same sense, and a constant pressure passes exactly where meshes match. Nodes meet nodes
+//! here; [`super::mortar`] is for meshes that do not match.
 
 use std::collections::{BTreeMap, HashMap};
 

@@ -69,21 +69,27 @@ pub fn areas(face: &[[f64; 3]]) -> Vec<f64> {
 }
 
 /// Six points of a triangle with quadratic shape functions, which may be curved: their values, and the normal times the
-/// area that the point stands for. Exact for polynomials of degree four (Dunavant 1985).
+/// area that the point stands for.
 fn quadratic_points(face: &[[f64; 3]; 6]) -> impl Iterator<Item = ([f64; 6], [f64; 3])> {
-    const RULE: [(f64, f64, f64); 2] = [
-        (0.445_948_490_915_965, 0.108_103_018_168_070, 0.223_381_589_678_011),
-        (0.091_576_213_509_771, 0.816_847_572_980_459, 0.109_951_743_655_322),
-    ];
-    (0..6).map(move |k| {
-        let (twice, once, weight) = RULE[k / 3];
-        let [p, q, r] = std::array::from_fn(|a| if a == k % 3 { once } else { twice });
+    quartic().map(move |(weight, [p, q, r])| {
         let corners = [p, q, r].map(|x| x * (2.0 * x - 1.0));
         let values = [corners[0], corners[1], corners[2], 4.0 * p * q, 4.0 * q * r, 4.0 * r * p];
         let first = [1.0 - 4.0 * p, 4.0 * q - 1.0, 0.0, 4.0 * (p - q), 4.0 * r, -4.0 * r];
         let second = [1.0 - 4.0 * p, 0.0, 4.0 * r - 1.0, -4.0 * q, 4.0 * q, 4.0 * (p - r)];
         let along = |d: [f64; 6]| std::array::from_fn(|i| (0..6).map(|k| d[k] * face[k][i]).sum());
         (values, area_vector(&[[0.0; 3], along(first), along(second)]).map(|x| weight * x))
+    })
+}
+
+/// Places in a triangle between its corners, with shares of its area: exact for polynomials of degree four (Dunavant 1985).
+pub fn quartic() -> impl Iterator<Item = (f64, [f64; 3])> {
+    const RULE: [(f64, f64, f64); 2] = [
+        (0.445_948_490_915_965, 0.108_103_018_168_070, 0.223_381_589_678_011),
+        (0.091_576_213_509_771, 0.816_847_572_980_459, 0.109_951_743_655_322),
+    ];
+    (0..6).map(|k| {
+        let (twice, once, weight) = RULE[k / 3];
+        (weight, std::array::from_fn(|a| if a == k % 3 { once } else { twice }))
     })
 }
 

@@ -103,6 +103,19 @@ fn element_states<'a>(problem: &'a TornProblem<'_>, u: &'a Torn) -> impl Iterato
     })
 }
 
+/// Where contact of a quadratic face has conditions at its corners only, its fields are linear: middles have the means.
+fn fill_middles(subdomain: &Subdomain, SlaveFields { pressure, gap, status }: &mut SlaveFields) {
+    let quadratic = subdomain.facets.iter().filter(|facet| facet.nodes.len() == 6);
+    let edges = quadratic.flat_map(|facet| (0..3).map(|k| [3 + k, k, (k + 1) % 3].map(|n| facet.nodes[n] as usize)));
+    for [middle, a, b] in edges {
+        if status[middle] < 0 && status[a] >= 0 && status[b] >= 0 {
+            pressure[middle] = 0.5 * (pressure[a] + pressure[b]);
+            gap[middle] = 0.5 * (gap[a] + gap[b]);
+            status[middle] = status[a].max(status[b]);
+        }
+    }
+}
+
 /// Contact at the nodes of a subdomain: where a node is in several contacts, the sum of the pressures and the smallest gap.
 struct SlaveFields {
     /// Zero off the slave surfaces.
@@ -125,5 +138,6 @@ fn slave_fields(subdomain: &Subdomain, pairs: &[ContactPair], contact: &[Contact
             fields.status[node] = fields.status[node].max(i64::from(state.force > 0.0));
         }
     }
+    fill_middles(subdomain, &mut fields);
     fields
 }

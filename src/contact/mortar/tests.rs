@@ -117,6 +117,82 @@ fn a_constant_pressure_acts_on_both_sides_as_it_should() {
     }
 }
 
+/// The same surface with quadratic faces: their middles halfway between the corners.
+fn quadratic(surface: GatheredSurface) -> GatheredSurface {
+    let GatheredSurface { mut nodes, mut points, triangles, .. } = surface;
+    let mut middles = BTreeMap::new();
+    let first = nodes[0];
+    let mut middle = |a: usize, b: usize| {
+        *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+            points.push(std::array::from_fn(|x| 0.5 * (points[a][x] + points[b][x])));
+            nodes.push(first + nodes.len() as u64);
+            nodes.len() - 1
+        })
+    };
+    let face = |[a, b, c]: [usize; 3]| [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
+    let quadratic: Vec<[usize; 6]> = triangles.into_iter().map(face).collect();
+    let cut = |&[a, b, c, ab, bc, ca]: &[usize; 6]| [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+    let triangles = quadratic.iter().flat_map(cut).collect();
+    GatheredSurface { nodes, points, triangles, share: 1.0, quadratic }
+}
+
+/// Nodal forces of a unit pressure, by the faces' own functions.
+fn consistent_forces(surface: &GatheredSurface) -> Vec<f64> {
+    let mut forces = vec![0.0; surface.nodes.len()];
+    for face in faces(surface) {
+        let places: Vec<[f64; 3]> = face.nodes.iter().map(|&node| surface.points[node]).collect();
+        face.nodes.iter().zip(surface::areas(&places)).for_each(|(&node, area)| forces[node] += area);
+    }
+    forces
+}
+
+#[test]
+fn a_constant_pressure_acts_on_quadratic_faces_as_it_should() {
+    for (slave, master) in [(true, true), (true, false), (false, true)].map(|which| {
+        let (slave, master) = flat(0.1);
+        let of = |turn: bool, surface| if turn { quadratic(surface) } else { surface };
+        (of(which.0, slave), of(which.1, master))
+    }) {
+        // Free, and with an edge that is held: its corners and middles.
+        let edge = |k: &[f64; 3]| (k[0] - 0.13).abs() < 1e-9;
+        let held = |some: bool| slave.points.iter().map(|p| if some && edge(p) { [true; 3] } else { FREE }).collect();
+        for held in [held(false), held(true)] {
+            let held: Vec<[bool; 3]> = held;
+            let pairs = pair(0, "joint", &slave, &master, &held).expect("they face each other");
+            let corners = if held[0] == FREE { 20 } else { 16 };
+            assert_eq!(pairs.len(), corners);
+            for p in &pairs {
+                let factor = 1.0 + sum(&p.others);
+                assert!(
+                    p.area > 0.0 && (p.gap - 0.1 * factor).abs() < 1e-12 && (sum(&p.masters) - factor).abs() < 1e-12
+                );
+                // Linear functions of the place have no jump.
+                let linear = |[x, y, _]: [f64; 3]| 1.0 + 2.0 * x - 3.0 * y;
+                let own = linear(slave.points[(p.slave - 100) as usize]);
+                let here = own + mean(&p.others, &slave, linear);
+                assert!((mean(&p.masters, &master, linear) - here).abs() < 1e-12);
+            }
+            let (on_slave, on_master) = forces(&pairs, &slave, &master);
+            for (found, expected) in on_slave.iter().zip(consistent_forces(&slave)) {
+                assert!((found - expected).abs() < 1e-13, "{found} {expected}");
+            }
+            assert!((on_master.iter().sum::<f64>() - on_slave.iter().sum::<f64>()).abs() < 1e-13);
+        }
+    }
+    // The larger one as the slave: the master gets what a pressure on it gives, but for slave nodes of which little is covered.
+    let (mut master, mut slave) = flat(0.1);
+    for surface in [&mut master, &mut slave] {
+        surface.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    }
+    let (master, slave) = (quadratic(master), quadratic(slave));
+    let pairs = pair(0, "joint", &slave, &master, &vec![FREE; slave.nodes.len()]).expect("they face each other");
+    let (_, on_master) = forces(&pairs, &slave, &master);
+    let largest = slave.normals_and_areas().into_iter().fold(0.0, |largest: f64, (_, area)| largest.max(area));
+    for (found, expected) in on_master.iter().zip(consistent_forces(&master)) {
+        assert!((found - expected).abs() < COVERED_QUADRATIC * largest, "{found} {expected}");
+    }
+}
+
 #[test]
 fn held_nodes_carry_no_condition_but_their_share_of_the_pressure() {
     let (slave, master) = flat(0.0);
