@@ -34,12 +34,19 @@ struct State {
 /// # Panics
 /// With the first panic of any rank; the other ranks are woken and end too, so nothing hangs.
 pub fn run<T: Send>(size: usize, body: impl Fn(&dyn Comm) -> T + Sync) -> Vec<T> {
+    let results: Vec<_> = (0..size).map(|_| Mutex::new(None)).collect();
+    start(size, &|comm| *results[comm.rank()].lock().unwrap_or_else(|e| e.into_inner()) = Some(body(comm)));
+    let result = |slot: Mutex<Option<T>>| slot.into_inner().unwrap_or_else(|e| e.into_inner());
+    results.into_iter().map(|slot| result(slot).expect("a rank that does not panic has a result")).collect()
+}
+
+/// As [`run`], compiled once for all bodies.
+fn start(size: usize, body: &(dyn Fn(&dyn Comm) + Sync)) {
     let post = Arc::new(Post::default());
     let outcomes: Vec<_> = std::thread::scope(|scope| {
         let handles: Vec<_> = (0..size)
             .map(|rank| {
                 let comm = Thread { rank, size, post: Arc::clone(&post) };
-                let body = &body;
                 scope.spawn(move || {
                     let outcome = catch_unwind(AssertUnwindSafe(|| body(&comm)));
                     if outcome.is_err() {
@@ -52,12 +59,9 @@ pub fn run<T: Send>(size: usize, body: impl Fn(&dyn Comm) -> T + Sync) -> Vec<T>
             .collect();
         handles.into_iter().map(|h| h.join().unwrap_or_else(Err)).collect()
     });
-    let (good, bad): (Vec<_>, Vec<_>) = outcomes.into_iter().partition(Result::is_ok);
     // A rank that only followed another's failure says nothing of the cause.
-    let cause = bad.into_iter().filter_map(Result::err).min_by_key(|p| p.is::<Woken>());
-    match cause {
-        Some(panic) => resume_unwind(panic),
-        None => good.into_iter().filter_map(Result::ok).collect(),
+    if let Some(panic) = outcomes.into_iter().filter_map(Result::err).min_by_key(|p| p.is::<Woken>()) {
+        resume_unwind(panic);
     }
 }
 
