@@ -50,9 +50,9 @@ fn mean_dilatation_keeps_nearly_incompressible_bodies_from_locking() {
     assert!(locked < 0.5, "{locked}");
 }
 
-/// The benchmark with cells twice as large at level 1.
+/// The benchmark with cells three times as large at level 1.
 const COARSE: [&str; 3] =
-    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
+    ["body.lower.brick.cells=[10, 3, 3]", "body.upper.brick.cells=[10, 3, 3]", "decomposition.cells=[5, 3, 3]"];
 
 #[test]
 fn the_benchmark_converges_from_rest_and_from_a_coarser_level_alike() {
