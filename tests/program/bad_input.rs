@@ -1,9 +1,11 @@
 //! Bad input: one message that names what is wrong and what is allowed, the right exit code, on 1 and on 2 ranks, and
-//! earlier results stay as they were.
+//! earlier results stay as they were. The program is started for each way that a refusal may take.
 
 use std::fs;
 
-use crate::common::{EARLIER, assert_refused, assert_scene_refused, run_briefly, scene_file};
+use crate::common::{
+    EARLIER, assert_program_refuses, assert_refused, assert_scene_refused, run_briefly, run_misused, scene_file,
+};
 
 const USAGE: i32 = 64;
 const BAD_SCENE: i32 = 65;
@@ -27,7 +29,8 @@ fn assert_text_refused(from: &str, to: &str, parts: &[&str]) {
 #[test]
 fn an_unknown_key_is_named_with_its_place_and_the_known_ones() {
     assert_text_refused("young =", "youg =", &["youg", "line 8", "young", "poisson", "yield_stress", "hardening"]);
-    assert_override_refused("solver.tolerance=1e-3", &["solver.tolerance=1e-3", "newton_tolerance", "qp_tolerance"]);
+    let parts = ["solver.tolerance=1e-3", "newton_tolerance", "qp_tolerance"];
+    assert_program_refuses("patch", &["solver.tolerance=1e-3"], BAD_SCENE, &parts);
 }
 
 #[test]
@@ -71,7 +74,8 @@ fn surfaces_that_do_not_exist_are_named() {
 
 #[test]
 fn surfaces_that_nowhere_face_each_other_are_no_contact() {
-    assert_override_refused("body.upper.brick.origin.0=5000", &["contact.joint", "opposite"]);
+    let sets = ["body.upper.brick.origin.0=5000"];
+    assert_program_refuses("patch", &sets, BAD_SCENE, &["contact.joint", "opposite"]);
 }
 
 #[test]
@@ -91,7 +95,12 @@ fn obstacles_that_make_no_sense_are_refused() {
     refused(&["contact.ball.master=cube.zmin"], &["contact.ball.master", "either master or rigid"]);
     refused(&["contact.ball.rigid.sphere.centre.2=-5"], &["contact.ball", "289", "faces the obstacle"]);
     let under = ["contact.ball.slave=cube.zmin", "contact.ball.rigid.sphere.centre.2=-0.59"];
-    refused(&under, &["contact.ball", "supports hold 13 of its nodes", "1.00e-2 deep"]);
+    assert_program_refuses(
+        "step-42",
+        &under,
+        BAD_SCENE,
+        &["contact.ball", "supports hold 13 of its nodes", "1.00e-2 deep"],
+    );
 }
 
 #[test]
@@ -99,7 +108,7 @@ fn a_body_that_nothing_holds_is_named_with_its_free_motions() {
     let text = include_str!("../../src/scene/library/bar.toml").replace("fix = [\"z\"]", "fix = [\"y\"]");
     let directory = tempfile::tempdir().unwrap();
     let file = scene_file(directory.path(), &text);
-    assert_scene_refused(&file, &[], BAD_SCENE, &["body.bar", "translation along z", "add supports"]);
+    assert_program_refuses(&file, &[], BAD_SCENE, &["body.bar", "translation along z", "add supports"]);
 }
 
 #[test]
@@ -128,8 +137,8 @@ fn bad_toml_is_shown_with_line_and_column() {
 
 #[test]
 fn an_unknown_scene_is_told_the_known_ones() {
-    assert_scene_refused("two-bloks", &[], BAD_SCENE, &["two-bloks", "two-blocks", "patch", "TOML file"]);
-    assert_scene_refused("no/such/scene.toml", &[], INPUT_OUTPUT, &["no/such/scene.toml", "No such file"]);
+    assert_program_refuses("two-bloks", &[], BAD_SCENE, &["two-bloks", "two-blocks", "patch", "TOML file"]);
+    assert_program_refuses("no/such/scene.toml", &[], INPUT_OUTPUT, &["no/such/scene.toml", "No such file"]);
 }
 
 #[test]
@@ -153,10 +162,10 @@ fn a_place_that_cannot_be_written_is_refused_before_anything_is_solved() {
 #[test]
 fn a_wrong_command_line_is_a_usage_error() {
     for ranks in [1, 2] {
-        assert_refused(&run_briefly(ranks, &["solve", "patch", "--fast"]), USAGE, &["--fast"]);
-        assert_refused(&run_briefly(ranks, &["slove"]), USAGE, &["slove"]);
-        assert_refused(&run_briefly(ranks, &["solve", "patch", "--level", "two"]), USAGE, &["--level", "two"]);
-        assert_refused(&run_briefly(ranks, &["show", "nothing"]), USAGE, &["nothing", "two-blocks"]);
+        assert_refused(&run_misused(ranks, &["solve", "patch", "--fast"]), USAGE, &["--fast"]);
+        assert_refused(&run_misused(ranks, &["slove"]), USAGE, &["slove"]);
+        assert_refused(&run_misused(ranks, &["solve", "patch", "--level", "two"]), USAGE, &["--level", "two"]);
+        assert_refused(&run_misused(ranks, &["show", "nothing"]), USAGE, &["nothing", "two-blocks"]);
     }
 }
 

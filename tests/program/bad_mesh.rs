@@ -5,8 +5,9 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::msh::{Form, write};
-use crate::common::{assert_refused, assert_scene_refused, run_briefly, scene_file};
+use crate::common::{assert_program_refuses, assert_refused, assert_scene_refused, run_briefly, scene_file};
 use fetiplast::mesh::Brick;
+use tempfile::TempDir;
 
 const BAD: i32 = 65;
 const INPUT_OUTPUT: i32 = 74;
@@ -69,11 +70,18 @@ fn changed(from: &str, to: &str) -> String {
     text.replacen(from, to, 1)
 }
 
-#[track_caller]
-fn refused(scene: &str, mesh: &[u8], sets: &[&str], code: i32, parts: &[&str]) {
+/// A directory with this mesh, and the file of the scene there.
+fn files(scene: &str, mesh: &[u8]) -> (TempDir, String) {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("two.msh"), mesh).unwrap();
-    assert_scene_refused(&scene_file(directory.path(), scene), sets, code, parts);
+    let file = scene_file(directory.path(), scene);
+    (directory, file)
+}
+
+#[track_caller]
+fn refused(scene: &str, mesh: &[u8], sets: &[&str], code: i32, parts: &[&str]) {
+    let (_directory, file) = files(scene, mesh);
+    assert_scene_refused(&file, sets, code, parts);
 }
 
 /// The scene is refused with this mesh.
@@ -101,14 +109,16 @@ fn the_scene_itself_is_sound() {
 #[test]
 fn files_that_cannot_be_read_are_an_input_error() {
     let scene = SCENE.replace("file = \"two.msh\"", "file = \"three.msh\"");
-    refused(&scene, b"", &[], INPUT_OUTPUT, &["three.msh", "No such file"]);
+    let (_directory, file) = files(&scene, b"");
+    assert_program_refuses(&file, &[], INPUT_OUTPUT, &["three.msh", "No such file"]);
     let scene = SCENE.replace("file = \"two.msh\"", "file = \"/\"");
     refused(&scene, b"", &[], INPUT_OUTPUT, &["cannot read the mesh file", "directory"]);
 }
 
 #[test]
 fn other_files_and_formats_are_told() {
-    mesh_refused("", &["not a Gmsh mesh", "gmsh -3"]);
+    let (_directory, file) = files(SCENE, b"");
+    assert_program_refuses(&file, &[], BAD, &["two.msh", "not a Gmsh mesh", "gmsh -3"]);
     mesh_refused("SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\n", &["not a Gmsh mesh", "$MeshFormat"]);
     mesh_refused([0, 159, 146, 150, 255], &["not a Gmsh mesh"]);
     mesh_refused(changed("4.1 0 8", "4 0 8"), &["MSH version 4 ", "Mesh.MshFileVersion = 4.1;"]);
@@ -219,8 +229,9 @@ fn what_the_scene_wants_of_a_mesh_must_be_possible() {
     scene_refused(&["body.below.gmsh.scale=0"], &["body.below.gmsh.scale = 0.0", "positive"]);
     scene_refused(&["body.below.gmsh.turn=3"], &["unknown key `turn`", "rotate"]);
     scene_refused(&["body.above.gmsh.translate=[100, 0, 0]"], &["contact.joint", "opposite"]);
+    let (_directory, file) = files(SCENE, &bytes(Form::Binary41));
     let conflict = "support.side.displacement=[0.5, 0, 0]";
-    scene_refused(&[conflict], &["back", "side", "along x", "0.5"]);
+    assert_program_refuses(&file, &[conflict], BAD, &["back", "side", "along x", "0.5"]);
 }
 
 #[test]

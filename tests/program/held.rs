@@ -2,7 +2,8 @@
 
 use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
 use crate::common::{
-    self, assert_close, assert_scene_refused, check, number, scene_file, solve, solve_tightly, vector,
+    self, assert_close, assert_program_refuses, assert_scene_refused, check, number, scene_file, solve, solve_tightly,
+    vector,
 };
 use serde_json::Value;
 
@@ -235,12 +236,12 @@ fn a_block_is_pushed_along_without_force() {
 #[test]
 fn bodies_that_loads_drive_away_are_refused_with_their_motion() {
     let pulled = guides(1) + "load.pull = { surface = 'b1.zmax', traction = [0, 0, 5] }\n";
-    let parts = ["body.b1", "loads drive its translation along +z", "add a support"];
-    assert_refused(&scene(1, &pulled, ""), &[], &parts);
-    // Not only where it is solved.
     let directory = tempfile::tempdir().unwrap();
-    let checked = check(2, &scene_file(directory.path(), &scene(1, &pulled, "")), 1, &[]);
-    common::assert_refused(&checked, BAD_SCENE, &parts);
+    let file = scene_file(directory.path(), &scene(1, &pulled, ""));
+    let parts = ["body.b1", "loads drive its translation along +z", "add a support"];
+    assert_program_refuses(&file, &[], BAD_SCENE, &parts);
+    // Not only where it is solved.
+    common::assert_refused(&check(2, &file, 1, &[]), BAD_SCENE, &parts);
 
     // Without friction nothing holds a block sideways.
     let pushed = "support.y1 = { surface = 'b1.ymin', fix = ['y'] }\n\

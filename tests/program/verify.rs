@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::common::{assert_refused, run_briefly, verify};
+use crate::common::{assert_refused, run_misused, verify};
 
 const CHEAP: [&str; 6] = ["uniaxial", "biaxial", "shear", "plane-strain", "patch-elastic", "patch-plastic"];
 
@@ -46,7 +46,7 @@ fn errors_are_the_same_on_any_number_of_ranks() {
 fn an_unknown_case_is_refused_with_the_known_ones() {
     for ranks in [1, 2] {
         let parts = [&["there is no case `typo`", "manufactured-plastic"][..], &CHEAP].concat();
-        assert_refused(&run_briefly(ranks, &["verify", "uniaxial", "typo"]), 64, &parts);
+        assert_refused(&run_misused(ranks, &["verify", "uniaxial", "typo"]), 64, &parts);
     }
-    assert_refused(&run_briefly(1, &["verify", "--element", "tet5"]), 64, &["tet4, hex8 or tet10"]);
+    assert_refused(&run_misused(1, &["verify", "--element", "tet5"]), 64, &["tet4, hex8 or tet10"]);
 }

@@ -11,6 +11,10 @@ use std::sync::{Mutex, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use clap::Parser;
+use fetiplast::cli::keeper::Signals;
+use fetiplast::cli::{Cli, run};
+use fetiplast::comm::threads;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -109,8 +113,17 @@ fn scene_command(
 /// Runs the program with these arguments. For runs that end before they solve anything: most of their time they wait
 /// for processes to start.
 pub fn run_briefly(ranks: usize, arguments: &[&str]) -> Run {
-    launch_beside_others(ranks, arguments, tempfile::tempdir().unwrap())
+    launch_beside_others(ranks, arguments, tempfile::tempdir().unwrap(), &[NO_GRACE])
 }
+
+/// As [`run_briefly`], for what ends before MPI is up: there ranks do not wait for each other.
+pub fn run_misused(ranks: usize, arguments: &[&str]) -> Run {
+    launch_beside_others(ranks, arguments, tempfile::tempdir().unwrap(), &[])
+}
+
+/// When a rank ends with a code other than 0, mpirun would wait a second before it ends itself: in vain where the ranks
+/// have waited for each other.
+const NO_GRACE: (&str, &str) = ("OMPI_MCA_odls_base_sigkill_timeout", "0");
 
 /// Writes a scene file of this text to a directory.
 pub fn scene_file(directory: &Path, text: &str) -> String {
@@ -183,11 +196,12 @@ pub fn send(signal: &str, process: u32) {
 fn launch(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
     // A failed test poisons the lock, which guards no data.
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    launch_beside_others(ranks, arguments, directory)
+    launch_beside_others(ranks, arguments, directory, &[NO_GRACE])
 }
 
-fn launch_beside_others(ranks: usize, arguments: &[&str], directory: TempDir) -> Run {
-    let (command, streams) = prepare(ranks, arguments, directory.path());
+fn launch_beside_others(ranks: usize, arguments: &[&str], directory: TempDir, environment: &[(&str, &str)]) -> Run {
+    let (mut command, streams) = prepare(ranks, arguments, directory.path());
+    command.envs(environment.iter().copied());
     let status = wait(command, |_| ());
     let [stdout, stderr] = streams.map(|path| fs::read_to_string(path).unwrap());
     let code = status.code().unwrap_or_else(|| panic!("{status}: {stderr}"));
@@ -278,8 +292,12 @@ pub const EARLIER: &str = "earlier results";
 /// Fails unless the program says one thing, once, without a backtrace, that has all the parts.
 #[track_caller]
 pub fn assert_refused(run: &Run, code: i32, parts: &[&str]) {
-    let said = &run.stderr;
-    assert_eq!(run.code, code, "{said}");
+    assert_message(&run.stderr, run.code, code, parts);
+}
+
+#[track_caller]
+fn assert_message(said: &str, ended: i32, code: i32, parts: &[&str]) {
+    assert_eq!(ended, code, "{said}");
     let messages = said.lines().filter(|line| line.starts_with("fetiplast:") || line.starts_with("error:")).count();
     assert_eq!(messages, 1, "{said}");
     for part in parts {
@@ -290,20 +308,48 @@ pub fn assert_refused(run: &Run, code: i32, parts: &[&str]) {
     }
 }
 
-/// Solves with these overrides, on 1 and 2 ranks, where results of that name exist already.
+/// Fails unless solving the scene with these overrides, on 1 and 2 ranks, ends on every rank with this exit code and the
+/// same message, which has all the parts, and leaves results of that name as they were. Ranks are threads of the test, for
+/// starting processes takes long; how the program ends with what a rank is told, [`assert_program_refuses`] shows.
 #[track_caller]
 pub fn assert_scene_refused(scene: &str, sets: &[&str], code: i32, parts: &[&str]) {
-    let name = Path::new(scene).file_stem().unwrap().to_str().unwrap();
     for ranks in [1, 2] {
-        let out = tempfile::tempdir().unwrap();
-        let (result, summary) = (out.path().join(format!("{name}.vtkhdf")), out.path().join(format!("{name}.json")));
-        fs::write(&result, EARLIER).unwrap();
-        fs::write(&summary, EARLIER).unwrap();
-        let mut arguments = vec!["solve", scene, "--out", out.path().to_str().unwrap()];
-        arguments.extend(sets.iter().flat_map(|set| ["--set", set]));
-        assert_refused(&run_briefly(ranks, &arguments), code, parts);
-        assert_eq!(fs::read_to_string(&result).unwrap(), EARLIER);
-        assert_eq!(fs::read_to_string(&summary).unwrap(), EARLIER);
-        assert_eq!(fs::read_dir(out.path()).unwrap().count(), 2, "no other files appear");
+        where_results_are(scene, sets, |arguments| {
+            let refusals = threads::run(ranks, |comm| {
+                let cli = Cli::try_parse_from([&["fetiplast"], arguments].concat()).expect("the command line is sound");
+                let command = cli.command.expect("a command is given");
+                let refusal = run(command, comm, Signals::default()).expect_err("the scene is refused");
+                (refusal.code(), refusal.to_string())
+            });
+            for refusal in &refusals {
+                assert_eq!(*refusal, refusals[0], "every rank says the same");
+            }
+            assert_message(&format!("fetiplast: {}", refusals[0].1), refusals[0].0, code, parts);
+        });
     }
+}
+
+/// As [`assert_scene_refused`], for the program under `mpirun`: the message comes once.
+#[track_caller]
+pub fn assert_program_refuses(scene: &str, sets: &[&str], code: i32, parts: &[&str]) {
+    for ranks in [1, 2] {
+        where_results_are(scene, sets, |arguments| assert_refused(&run_briefly(ranks, arguments), code, parts));
+    }
+    assert_scene_refused(scene, sets, code, parts);
+}
+
+/// Hands the arguments that solve a scene where results of that name exist, and fails if these are not as before then.
+#[track_caller]
+fn where_results_are(scene: &str, sets: &[&str], refused: impl FnOnce(&[&str])) {
+    let name = Path::new(scene).file_stem().unwrap().to_str().unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let (result, summary) = (out.path().join(format!("{name}.vtkhdf")), out.path().join(format!("{name}.json")));
+    fs::write(&result, EARLIER).unwrap();
+    fs::write(&summary, EARLIER).unwrap();
+    let mut arguments = vec!["solve", scene, "--out", out.path().to_str().unwrap()];
+    arguments.extend(sets.iter().flat_map(|set| ["--set", set]));
+    refused(&arguments);
+    assert_eq!(fs::read_to_string(&result).unwrap(), EARLIER);
+    assert_eq!(fs::read_to_string(&summary).unwrap(), EARLIER);
+    assert_eq!(fs::read_dir(out.path()).unwrap().count(), 2, "no other files appear");
 }
