@@ -2,14 +2,13 @@
 """Errors of contact between curved surfaces against closed forms, on refined meshes.
 
     scripts/accuracy.py run [STUDY ...] [--np 2]    makes meshes, solves, appends to bench-results/accuracy.jsonl
-    scripts/accuracy.py write                       makes bench-results/accuracy.md of it
+    scripts/accuracy.py write [--check]             makes bench-results/accuracy.md of it, or only says whether it is up to date
 
 Studies are ring, patch and hertz; all of them take five minutes.
 
 Needs the packages of scripts/requirements.txt and a release build.
 """
 
-import argparse
 import json
 import pathlib
 import subprocess
@@ -18,6 +17,8 @@ import tempfile
 
 import h5py
 import numpy as np
+
+from bench import pages
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 RECORDS = ROOT / "bench-results/accuracy.jsonl"
@@ -233,9 +234,9 @@ def hertz(ranks):
 STUDIES = {"ring": ring, "patch": patch, "hertz": hertz}
 
 
-def run(arguments):
-    for study in arguments.studies or STUDIES:
-        for place, summary, errors in STUDIES[study](arguments.np):
+def run(studies, ranks):
+    for study in studies or STUDIES:
+        for place, summary, errors in STUDIES[study](ranks):
             record = {"study": study, **place, "nodes": summary["nodes"], "elements": summary["elements"]}
             record |= {"slave": summary["contacts"][0]["slave"], "rule": summary["contacts"][0]["rule"]}
             record |= {"seconds": summary["time_total"], "ranks": summary["ranks"]}
@@ -260,7 +261,7 @@ closed nodes' share of the surface; *radius of inertia*: from the second moment 
 }
 
 
-def write(_):
+def contents():
     """The last record of each study, family and mesh, with orders between the rows of a family."""
     records = {}
     for line in RECORDS.read_text().splitlines():
@@ -290,20 +291,8 @@ def write(_):
                 cells.append(cell)
             text += "| " + " | ".join(cells) + " |\n"
             above = row
-    TABLE.write_text(text)
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(required=True)
-    running = commands.add_parser("run")
-    running.add_argument("studies", nargs="*", metavar="STUDY", help=", ".join(STUDIES))
-    running.add_argument("--np", type=int, default=2)
-    running.set_defaults(act=run)
-    commands.add_parser("write").set_defaults(act=write)
-    arguments = parser.parse_args()
-    arguments.act(arguments)
+    return {TABLE: text}
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(pages.run_or_write(__doc__.splitlines()[0], "scripts/accuracy.py", "STUDY", run, contents))

@@ -2,18 +2,19 @@
 """Errors of the program against closed forms, with each element, on meshes that get finer.
 
     scripts/verification.py run [CASE ...] [--np 2]    runs `fetiplast verify`, keeps bench-results/verification.json
-    scripts/verification.py write                      makes bench-results/verification.md of it
+    scripts/verification.py write [--check]            makes bench-results/verification.md of it, or only says whether it is up to date
 
 All cases take minutes. Needs a release build.
 """
 
-import argparse
 import json
 import math
 import pathlib
 import subprocess
+import sys
 import tempfile
 
+from bench import pages
 from bench.markdown import table
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -28,20 +29,20 @@ between a mesh and the one before. Below each table what is demanded; *missed* d
 """
 
 
-def run(arguments):
+def run(cases, ranks):
     """Results of the cases replace those of earlier runs."""
     records = json.loads(RECORDS.read_text()) if RECORDS.exists() else {"cases": []}
     with tempfile.TemporaryDirectory() as directory:
         summary = pathlib.Path(directory) / "summary.json"
-        command = ["mpirun", "-np", str(arguments.np), str(ROOT / "target/release/fetiplast"), "verify"]
+        command = ["mpirun", "-np", str(ranks), str(ROOT / "target/release/fetiplast"), "verify"]
         # A missed demand is a result too.
-        subprocess.run([*command, "--summary", str(summary), *arguments.cases], check=False)
+        subprocess.run([*command, "--summary", str(summary), *cases], check=False)
         new = json.loads(summary.read_text())
     measured = {case["case"] for case in new["cases"]}
     order = list(dict.fromkeys(case["case"] for case in records["cases"] + new["cases"]))
-    cases = [case for case in records["cases"] if case["case"] not in measured] + new["cases"]
-    cases.sort(key=lambda case: order.index(case["case"]))
-    RECORDS.write_text(json.dumps({"ranks": arguments.np, "cases": cases}, indent=1) + "\n")
+    all_cases = [case for case in records["cases"] if case["case"] not in measured] + new["cases"]
+    all_cases.sort(key=lambda case: order.index(case["case"]))
+    RECORDS.write_text(json.dumps({"ranks": ranks, "cases": all_cases}, indent=1) + "\n")
 
 
 def cell(row, before, name):
@@ -56,7 +57,7 @@ def cell(row, before, name):
     return text
 
 
-def write(_):
+def contents():
     records = json.loads(RECORDS.read_text())
     text = INTRODUCTION.format(ranks=records["ranks"])
     for name in dict.fromkeys(case["case"] for case in records["cases"]):
@@ -73,20 +74,8 @@ def write(_):
             demands.append(f"- {case['element']}: " + ("; ".join(met) or "nothing demanded"))
         text += f"\n## {name}\n\n" + elements[0]["about"] + "\n\n"
         text += table(["element", "level", "nodes", "Newton", "F", *errors], rows) + "\n" + "\n".join(demands) + "\n"
-    TABLE.write_text(text)
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(required=True)
-    running = commands.add_parser("run")
-    running.add_argument("cases", nargs="*", metavar="CASE")
-    running.add_argument("--np", type=int, default=2)
-    running.set_defaults(act=run)
-    commands.add_parser("write").set_defaults(act=write)
-    arguments = parser.parse_args()
-    arguments.act(arguments)
+    return {TABLE: text}
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(pages.run_or_write(__doc__.splitlines()[0], "scripts/verification.py", "CASE", run, contents))

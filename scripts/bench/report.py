@@ -5,7 +5,7 @@ import pathlib
 import statistics
 import sys
 
-from . import kernels, plot
+from . import kernels, pages, plot
 from .markdown import table
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -479,14 +479,4 @@ def table_of(number, file, variants, levels, ranks):
 
 def write(variants, study, ranks, only_check):
     """Writes what has changed. `study` lists the rows of Table 1, `ranks` are those of Table 2."""
-    stale = []
-    for path, text in contents(variants, study, ranks).items():
-        if not path.exists() or path.read_text() != text:
-            stale.append(str(path.relative_to(ROOT)))
-            if not only_check:
-                path.write_text(text)
-    if only_check and stale:
-        print(f"out of date: {', '.join(stale)}. Run scripts/tables write.", file=sys.stderr)
-        return 1
-    print(f"{'written' if stale else 'up to date'}: {', '.join(stale) or 'all tables'}")
-    return 0
+    return pages.write(contents(variants, study, ranks), "scripts/tables write", only_check)

@@ -1,10 +1,9 @@
 """Strong, weak and numerical scalability: tables and plots from the raw runs of scripts/study."""
 
 import json
-import sys
 import typing
 
-from . import plot
+from . import pages, plot
 from .markdown import table
 from .measure import ROOT
 from .report import Group, circumstances, thousands
@@ -207,20 +206,4 @@ def contents(folder, raw):
 
 
 def write(folder, raw, only_check):
-    return replace(contents(folder, raw), only_check, "scripts/study write")
-
-
-def replace(files, only_check, command):
-    """Writes what has changed, or only tells."""
-    stale = []
-    for path, text in files.items():
-        if not path.exists() or path.read_text() != text:
-            stale.append(path.name)
-            if not only_check:
-                path.write_text(text)
-    if only_check and stale:
-        print(f"out of date: {', '.join(stale)}. Run {command}.", file=sys.stderr)
-        return 1
-    names = stale or [path.name for path in files] or ["nothing, for there are no such runs"]
-    print(f"{'written' if stale else 'up to date'}: {', '.join(names)}")
-    return 0
+    return pages.write(contents(folder, raw), "scripts/study write", only_check)
