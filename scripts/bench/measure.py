@@ -38,15 +38,18 @@ class Program:
 
     def __init__(self, arguments):
         self.launch = shlex.split(arguments.launch)
-        self.path, self.environment = arguments.program, dict(os.environ)
         # Other nodes see the folder of the results, if anything.
-        self.shared = self.path is not None
-        if self.path is None:
-            subprocess.run(["scripts/setup"], cwd=ROOT, check=True)
-            entries = in_environment("env", "-0").split("\0")
-            self.environment = dict(entry.split("=", 1) for entry in entries if "=" in entry)
-            subprocess.run(["cargo", "build", "--release", "--quiet"], cwd=ROOT, env=self.environment, check=True)
-            self.path = pathlib.Path(self.environment.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "fetiplast"
+        self.shared = arguments.program is not None
+        self.path, self.environment = (arguments.program, dict(os.environ)) if self.shared else built()
+
+
+def built():
+    """The program of this repository as it is now, and the environment that scripts/run has."""
+    subprocess.run(["scripts/setup"], cwd=ROOT, check=True)
+    entries = in_environment("env", "-0").split("\0")
+    environment = dict(entry.split("=", 1) for entry in entries if "=" in entry)
+    subprocess.run(["cargo", "build", "--release", "--quiet"], cwd=ROOT, env=environment, check=True)
+    return pathlib.Path(environment.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "fetiplast", environment
 
 
 def run(runs, arguments, folder, prefix=""):
