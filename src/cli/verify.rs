@@ -32,7 +32,7 @@ impl Verify {
 }
 
 fn element(text: &str) -> Result<Element, String> {
-    let found = verify::ELEMENTS.into_iter().find(|element| verify::element_name(*element) == text);
+    let found = verify::ELEMENTS.into_iter().find(|element| element.name() == text);
     found.ok_or_else(|| "it is tet4, hex8 or tet10".into())
 }
 
@@ -59,7 +59,7 @@ pub fn verify(arguments: &Verify, comm: &dyn Comm) -> Result<i32, Failure> {
             };
             let measured = verify::measure(case, element, comm, &mut tell)?;
             for verdict in measured.verdicts.iter().filter(|verdict| !verdict.met) {
-                tracing::warn!("{} {}: MISSED {}", case.name(), verify::element_name(element), verdict.text);
+                tracing::warn!("{} {}: MISSED {}", case.name(), element.name(), verdict.text);
             }
             report.passed &= measured.passed();
             report.cases.push(measured);

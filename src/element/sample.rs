@@ -16,7 +16,7 @@ pub struct Sample {
 }
 
 /// Coordinates in [-1, 1] and weights, which add up to two.
-const GAUSS: [(f64, f64); 3] =
+pub const GAUSS: [(f64, f64); 3] =
     [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
 /// The points of an element with these nodes.

@@ -29,7 +29,6 @@ use self::rule::Place;
 use crate::assembly::stress::{self, Sample};
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
-use crate::element::Kind;
 use crate::feti::Torn;
 use crate::material::{History, Material};
 use crate::tensor::Voigt;
@@ -75,21 +74,6 @@ pub fn estimate(sums: &NodeSums, parts: &[Part], u: &Torn) -> Estimate {
     Estimate { errors, stresses }
 }
 
-/// The squares of the true error of the stresses at `u`, over each own subdomain, where the exact stress is known: given
-/// the index of a body, at a place.
-pub fn true_squares(parts: &[Part], u: &Torn, exact: &dyn Fn(usize, [f64; 3]) -> Voigt) -> Vec<f64> {
-    let of_part = |(part, u): (&Part, &Vec<f64>)| {
-        let Subdomain { points, elements, body, .. } = part.subdomain;
-        let at = |nodes: &[u32], values: &[f64]| {
-            let along =
-                |i: usize| nodes.iter().zip(values).map(|(&node, value)| value * points[node as usize][i]).sum();
-            exact(*body, std::array::from_fn(along))
-        };
-        part.squares(&part.samples(u), &rule::fine(elements.kind()), at).iter().sum()
-    };
-    parts.iter().zip(u).map(of_part).collect()
-}
-
 impl Part<'_> {
     fn samples(&self, u: &[f64]) -> Vec<Sample> {
         stress::samples(self.subdomain, self.material, self.history, u)
@@ -110,16 +94,7 @@ impl Part<'_> {
             };
             rule.iter().map(at).sum()
         };
-        elements.iter().zip(samples.chunks_exact(per_element(elements.kind()))).map(of_element).collect()
-    }
-}
-
-/// Integration points of an element.
-fn per_element(kind: Kind) -> usize {
-    match kind {
-        Kind::Tet4 => 1,
-        Kind::Tet10 => 4,
-        Kind::Hex8 => 8,
+        elements.iter().zip(samples.chunks_exact(elements.kind().points())).map(of_element).collect()
     }
 }
 

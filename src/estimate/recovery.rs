@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{per_element, polynomial};
+use super::polynomial;
 use crate::assembly::stress::Sample;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
@@ -96,7 +96,7 @@ impl<'a> Patches<'a> {
         let kind = self.subdomain.elements.kind();
         let width = self.sums_width();
         let mut sums = vec![0.0; width * self.nodes.len()];
-        for (nodes, samples) in self.elements().zip(samples.chunks_exact(per_element(kind))) {
+        for (nodes, samples) in self.elements().zip(samples.chunks_exact(kind.points())) {
             for face in kind.faces() {
                 let face = &face[..kind.corners_of_face()];
                 let area = area(face.iter().map(|&local| self.point(nodes[local])));

@@ -28,14 +28,6 @@ pub fn squares(kind: Kind) -> Vec<Place> {
     }
 }
 
-/// For functions that elements do not know.
-pub fn fine(kind: Kind) -> Vec<Place> {
-    match kind {
-        Kind::Hex8 => gauss(&[(-0.6_f64.sqrt(), 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.6_f64.sqrt(), 5.0 / 9.0)]),
-        _ => of_degree_five(kind),
-    }
-}
-
 fn gauss(line: &[(f64, f64)]) -> Vec<Place> {
     let mut places = Vec::new();
     for (z, c) in line {
@@ -81,8 +73,17 @@ fn of_degree_five(kind: Kind) -> Vec<Place> {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
+    use crate::element::sample::GAUSS;
+
+    /// For functions that elements do not know.
+    pub fn fine(kind: Kind) -> Vec<Place> {
+        match kind {
+            Kind::Hex8 => gauss(&GAUSS),
+            _ => of_degree_five(kind),
+        }
+    }
 
     /// Integrals of barycentric monomials over a tetrahedron of volume 1: 3! a! b! c! d! / (3 + a + b + c + d)!.
     #[test]

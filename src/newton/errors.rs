@@ -6,7 +6,6 @@ use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::estimate::{self, Estimate, Part};
 use crate::feti::Torn;
 use crate::monitor::timing::Timer;
-use crate::tensor::Voigt;
 
 /// How exact a solution is.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,17 +35,6 @@ impl TornProblem<'_> {
     /// What errors are relative to, given the sum of squares of the stress.
     fn stress_size(&self, squares: f64, state: &State) -> f64 {
         squares.sqrt().max(SIGNIFICANT * state.terms.energy.sqrt())
-    }
-
-    /// True error of the stress at `u` relative to the stress that was found, in the norm of [`Errors`], where the exact stress
-    /// is known: given the index of a body, at a place. Over it, an estimate is its effectivity. Collective.
-    pub fn true_error(&self, u: &Torn, exact: &dyn Fn(usize, [f64; 3]) -> Voigt) -> f64 {
-        let parts = self.parts();
-        let Estimate { stresses, .. } = estimate::estimate(self.sums, &parts, u);
-        let partial: Vec<f64> =
-            estimate::true_squares(&parts, u, exact).into_iter().zip(stresses).flat_map(|(e, s)| [e, s]).collect();
-        let sum = self.space.sum(&partial, 2);
-        relative(sum[0].sqrt(), self.stress_size(sum[1], &self.evaluate(u)))
     }
 }
 

@@ -152,6 +152,15 @@ pub enum Element {
 }
 
 impl Element {
+    /// As in scene files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Element::Tet4 => "tet4",
+            Element::Tet10 => "tet10",
+            Element::Hex8 => "hex8",
+        }
+    }
+
     /// Elements that fill one hexahedral cell.
     pub fn per_cell(self) -> usize {
         match self {

@@ -2,7 +2,6 @@
 
 use serde::{Serialize, Serializer};
 
-use super::element_name;
 use crate::scene::Element;
 
 /// What must hold of an error on the finest mesh.
@@ -72,15 +71,10 @@ pub struct Measured {
     pub case: &'static str,
     /// What the case is.
     pub about: &'static str,
-    #[serde(serialize_with = "in_scene_files")]
     pub element: Element,
     pub rows: Vec<Row>,
     /// What became of each demand, and of the runs themselves, when all are done.
     pub verdicts: Vec<Verdict>,
-}
-
-fn in_scene_files<S: Serializer>(element: &Element, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(element_name(*element))
 }
 
 /// What became of a demand.
@@ -149,7 +143,7 @@ impl Measured {
             format!("{:>24}", format!("{:.2e}{order:>8}", error.value))
         };
         let errors: String = errors.iter().enumerate().map(error).collect();
-        let element = element_name(self.element);
+        let element = self.element.name();
         format!("{:<20}{element:>6}{level:>6}{nodes:>9}{products:>8}{seconds:>8.2}{errors}", "")
     }
 }

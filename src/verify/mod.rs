@@ -120,19 +120,10 @@ pub fn measure(
 fn at_level(case: &dyn Case, element: Element, level: usize) -> Result<Scene, SceneError> {
     let text = case.scene();
     let plain = Scene::from_text(&text, case.name(), 1, &[])?;
-    let name = element_name(element);
+    let name = element.name();
     let elements = plain.body.keys().map(|body| format!("body.{body}.element={name}"));
     let sets: Vec<String> = elements.chain(TIGHT.map(str::to_owned)).collect();
     Scene::from_text(&text, case.name(), level, &sets)
-}
-
-/// As in scene files.
-pub fn element_name(element: Element) -> &'static str {
-    match element {
-        Element::Tet4 => "tet4",
-        Element::Tet10 => "tet10",
-        Element::Hex8 => "hex8",
-    }
 }
 
 /// The paper's steel, in MPa.
