@@ -2,15 +2,11 @@
 
 use std::sync::OnceLock;
 
-use crate::common::{assert_close, assert_residuals, number, solve_level, solve_with};
+use crate::common::{COARSEST, assert_close, assert_residuals, number, solve_level, solve_with};
 use serde_json::Value;
 
-/// The benchmark with cells three times as large.
-const COARSE: [&str; 3] =
-    ["body.lower.brick.cells=[10, 3, 3]", "body.upper.brick.cells=[10, 3, 3]", "decomposition.cells=[5, 3, 3]"];
-
 fn solve(ranks: usize, level: usize, cascade: &str) -> Value {
-    solve_with(ranks, "two-blocks", level, &COARSE, &["--cascade", cascade]).converged().summary()
+    solve_with(ranks, "two-blocks", level, &COARSEST, &["--cascade", cascade]).converged().summary()
 }
 
 /// On two ranks, solved once for all tests.

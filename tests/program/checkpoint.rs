@@ -6,15 +6,11 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use crate::common::fields::Fields;
-use crate::common::{End, children, run_disturbed, send, wait_for};
+use crate::common::{COARSE, End, children, only_result, run_disturbed, send, wait_for};
 use serde_json::{Map, Value};
 
 /// Plastic flow, and contact that opens again.
 const HISTORY: &str = "step=[{increments=2}, {amplitude=0.2}]";
-/// The benchmark with cells twice as large.
-const COARSE: [&str; 3] =
-    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
-
 /// A command line that solves two blocks, results in `out`.
 fn solve<'a>(out: &'a Path, sets: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
     let mut arguments = vec!["solve", "two-blocks", "--progress", "off", "--out", out.to_str().unwrap()];
@@ -31,33 +27,13 @@ fn checkpoint(out: &Path) -> PathBuf {
     out.join("two-blocks.checkpoint.h5")
 }
 
-/// Keys of the summary that belong to the run, not to its result.
-const OF_THE_RUN: [&str; 10] = [
-    "ranks",
-    "time",
-    "work",
-    "communication",
-    "time_total",
-    "imbalance",
-    "peak_rss_mb",
-    "peak_rss_mb_max",
-    "mesh_reading_mb",
-    "provenance",
-];
-
 /// Fields by name.
 type Bits = Vec<(String, Vec<u64>)>;
 
 /// The summary but for what belongs to the run, and the bits of all fields.
 fn result(out: &Path, name: &str) -> (Map<String, Value>, Bits) {
     let text = fs::read_to_string(out.join(format!("{name}.json"))).unwrap();
-    let Value::Object(mut summary) = serde_json::from_str(&text).unwrap() else { panic!("the summary is an object") };
-    OF_THE_RUN.iter().for_each(|key| assert!(summary.remove(*key).is_some(), "no key {key}"));
-    for list in ["newton", "cascade"] {
-        for row in summary[list].as_array_mut().unwrap() {
-            assert!(row.as_object_mut().unwrap().remove("seconds").is_some());
-        }
-    }
+    let summary = only_result(serde_json::from_str(&text).unwrap());
     let file = out.join(format!("{name}.vtkhdf"));
     let fields = Fields::at(&file, 0);
     let mut bits = fields.bits(&["VTKHDF/PointData", "VTKHDF/CellData", "convergence"]);

@@ -1,6 +1,6 @@
 //! What elements can do beyond homogeneous states: bending of nearly incompressible bodies, the benchmark.
 
-use crate::common::{assert_close, assert_residuals, number, scene_file, solve, solve_with};
+use crate::common::{COARSEST, assert_close, assert_residuals, number, scene_file, solve, solve_with};
 
 /// Deflection of a cantilever in plane strain under a shear traction at its end, over that of beam theory. Its height is 1.
 fn deflection(element: &str, cells: [usize; 2], poisson: f64) -> f64 {
@@ -50,15 +50,11 @@ fn mean_dilatation_keeps_nearly_incompressible_bodies_from_locking() {
     assert!(locked < 0.5, "{locked}");
 }
 
-/// The benchmark with cells three times as large at level 1.
-const COARSE: [&str; 3] =
-    ["body.lower.brick.cells=[10, 3, 3]", "body.upper.brick.cells=[10, 3, 3]", "decomposition.cells=[5, 3, 3]"];
-
 #[test]
 fn the_benchmark_converges_from_rest_and_from_a_coarser_level_alike() {
     for element in ["hex8"] {
         let elements = ["lower", "upper"].map(|body| format!("body.{body}.element={element}"));
-        let sets: Vec<&str> = COARSE.into_iter().chain(elements.iter().map(String::as_str)).collect();
+        let sets: Vec<&str> = COARSEST.into_iter().chain(elements.iter().map(String::as_str)).collect();
         let [cold, warm] =
             ["off", "on"].map(|way| solve_with(2, "two-blocks", 2, &sets, &["--cascade", way]).converged().summary());
         for key in ["energy", "internal_energy", "external_work", "max_displacement"] {
@@ -77,7 +73,7 @@ fn the_benchmark_converges_from_rest_and_from_a_coarser_level_alike() {
 fn quadratic_elements_solve_the_benchmark_with_less_energy_on_the_same_cells() {
     let solved = |ranks, element: &str| {
         let elements = ["lower", "upper"].map(|body| format!("body.{body}.element={element}"));
-        let sets: Vec<&str> = COARSE.into_iter().chain(elements.iter().map(String::as_str)).collect();
+        let sets: Vec<&str> = COARSEST.into_iter().chain(elements.iter().map(String::as_str)).collect();
         solve(ranks, "two-blocks", &sets).converged().summary()
     };
     let [alone, quadratic] = [1, 2].map(|ranks| solved(ranks, "tet10"));

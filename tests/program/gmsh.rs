@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::msh::{Form, write};
-use crate::common::{assert_close, assert_near, check, number, scene_file, solve, vector};
+use crate::common::{COARSE, assert_close, assert_near, check, number, scene_file, solve, vector};
 use fetiplast::mesh::Brick;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -13,9 +13,6 @@ use tempfile::TempDir;
 const TIGHT: [&str; 3] =
     ["solver.newton_tolerance=1e-8", "solver.residual_tolerance=1e-10", "solver.qp_tolerance=1e-10"];
 
-/// The benchmark with cells twice as large.
-const COARSE: [&str; 3] =
-    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
 const LOWER: Brick = Brick { origin: [0.0; 3], size: [3000.0, 1000.0, 1000.0], cells: [15, 5, 5] };
 const UPPER: Brick = Brick { origin: [600.0, 0.0, 1000.0], ..LOWER };
 

@@ -1,14 +1,12 @@
 //! Scenes that are hard for the method: near incompressibility, perfect plasticity, jumps of stiffness, degenerate
 //! contact, bodies that only contact holds, decompositions into shreds or into whole bodies.
 
-use crate::common::{Run, assert_close, assert_near, assert_residuals, number, scene_file, solve, solve_with, vector};
+use crate::common::{
+    COARSE, Run, assert_close, assert_near, assert_residuals, number, scene_file, solve, solve_with, vector,
+};
 use serde_json::Value;
 
 const RANKS: usize = 2;
-
-/// The benchmark with cells twice as large.
-const COARSE: [&str; 3] =
-    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
 
 /// Newton steps and applications of F in which every scene here must be solved.
 const MOST_STEPS: f64 = 15.0;

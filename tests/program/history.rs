@@ -2,15 +2,13 @@
 //! bodies in contact, increments that are cut back, and the series of results.
 
 use crate::common::fields::Fields;
-use crate::common::{Run, assert_close, assert_residuals, number, solve, vector};
+use crate::common::{COARSE, assert_close, assert_residuals, number, solve, solve_tightly, vector};
 use fetiplast::analytic::cycle::Cycle;
 use fetiplast::material::Material;
 use serde_json::Value;
 
 const RANKS: usize = 2;
 const EXACT: f64 = 1e-8;
-const TIGHT: [&str; 3] =
-    ["solver.newton_tolerance=1e-11", "solver.residual_tolerance=1e-11", "solver.qp_tolerance=1e-13"];
 
 /// Isotropic, kinematic, both: as `--set`s and as the material of the closed form.
 fn hardenings() -> [([String; 2], Material); 3] {
@@ -22,10 +20,6 @@ fn hardenings() -> [([String; 2], Material); 3] {
         let yield_stress = Some(450.0);
         (keys, Material { yield_stress, hardening, kinematic_hardening, ..Material::elastic(210_000.0, 0.29) })
     })
-}
-
-fn tightly(ranks: usize, scene: &str, sets: &[&str]) -> Run {
-    solve(ranks, scene, &[&TIGHT[..], sets].concat()).converged()
 }
 
 /// Fails unless all values are the expected one, relative to `scale`.
@@ -47,7 +41,7 @@ fn steps(of: impl Fn(f64) -> String) -> String {
 fn a_bar_follows_its_cycles_under_every_hardening() {
     for (keys, material) in hardenings() {
         let steps = steps(|stress| format!("{{amplitude={}}}", stress / 500.0));
-        let run = tightly(RANKS, "bar", &[&keys[0], &keys[1], &steps]);
+        let run = solve_tightly(RANKS, "bar", &[&keys[0], &keys[1], &steps]);
         assert_eq!(Fields::times(&run.result()).unwrap(), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         let summary = run.summary();
         let mut exact = Cycle::new(material);
@@ -84,7 +78,7 @@ fn a_sheared_block_follows_its_cycles_under_every_hardening() {
             format!("{{amplitude={load}, support={{top={top}}}}}")
         };
         let steps = format!("step=[{}]", states.iter().map(step).collect::<Vec<_>>().join(", "));
-        let run = tightly(RANKS, "shear", &[&keys[0], &keys[1], &steps]);
+        let run = solve_tightly(RANKS, "shear", &[&keys[0], &keys[1], &steps]);
         for (index, state) in states.iter().enumerate() {
             let fields = Fields::at(&run.result(), index);
             let moved = fields.displacement.iter().zip(&fields.points);
@@ -100,7 +94,7 @@ fn a_sheared_block_follows_its_cycles_under_every_hardening() {
 #[test]
 fn contact_opens_by_the_plastic_imprint_and_closes_again() {
     let steps = "step=[{increments=3}, {amplitude=0}, {amplitude=0.5}, {amplitude=1.2}]";
-    let run = tightly(RANKS, "patch", &["support.top.displacement.2=-10", steps]);
+    let run = solve_tightly(RANKS, "patch", &["support.top.displacement.2=-10", steps]);
     let summary = run.summary();
     let mut exact = Cycle::new(hardenings()[0].1);
     let mut index = 0;
@@ -124,17 +118,14 @@ fn contact_opens_by_the_plastic_imprint_and_closes_again() {
 #[test]
 fn an_elastic_history_ends_where_it_began() {
     let steps = "step=[{increments=2}, {amplitude=0}]";
-    let run = tightly(RANKS, "two-blocks-elastic", &[&COARSE[..], &[steps]].concat());
-    let once = tightly(RANKS, "two-blocks-elastic", &COARSE).summary();
+    let run = solve_tightly(RANKS, "two-blocks-elastic", &[&COARSE[..], &[steps]].concat());
+    let once = solve_tightly(RANKS, "two-blocks-elastic", &COARSE).summary();
     let rows = run.summary()["steps"].clone();
     let energy = |row: &Value| number(row, "energy");
     assert_close("full load", energy(&rows[1]), energy(&once), 1e-9);
     assert!(number(&rows[2], "max_displacement") < 1e-9 * number(&once, "max_displacement"));
     assert!(energy(&rows[2]).abs() < 1e-15 * energy(&once).abs());
 }
-
-const COARSE: [&str; 3] =
-    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
 
 /// One step from zero is one step from zero, however it is written.
 #[test]
@@ -154,7 +145,7 @@ fn a_single_step_is_the_scene_without_steps() {
 #[test]
 fn reloading_returns_to_the_loaded_state() {
     let steps = "step=[{increments=2}, {amplitude=0}, {}]";
-    let run = tightly(RANKS, "two-blocks", &[&COARSE[..], &[steps]].concat());
+    let run = solve_tightly(RANKS, "two-blocks", &[&COARSE[..], &[steps]].concat());
     let (loaded, unloaded, again) =
         (Fields::at(&run.result(), 1), Fields::at(&run.result(), 2), Fields::at(&run.result(), 3));
     let size = loaded.displacement.as_flattened().iter().fold(0.0_f64, |a, b| a.max(b.abs()));

@@ -15,7 +15,7 @@ use clap::Parser;
 use fetiplast::cli::keeper::Signals;
 use fetiplast::cli::{Cli, run};
 use fetiplast::comm::threads;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use tempfile::TempDir;
 
 /// One run at a time: ranks wait busily, and two runs on two cores would each wait for the other.
@@ -56,6 +56,38 @@ impl Run {
 }
 
 const SUMMARY: &str = "summary.json";
+
+/// The benchmark with cells twice as large: plastic flow, contact and all six subdomains survive that.
+pub const COARSE: [&str; 3] =
+    ["body.lower.brick.cells=[15, 5, 5]", "body.upper.brick.cells=[15, 5, 5]", "decomposition.cells=[5, 5, 5]"];
+
+/// With cells three times as large: four subdomains.
+pub const COARSEST: [&str; 3] =
+    ["body.lower.brick.cells=[10, 3, 3]", "body.upper.brick.cells=[10, 3, 3]", "decomposition.cells=[5, 3, 3]"];
+
+/// A summary without what belongs to the run, and may depend on the ranks or on the clock.
+pub fn only_result(summary: Value) -> Map<String, Value> {
+    const OF_THE_RUN: [&str; 10] = [
+        "ranks",
+        "time",
+        "work",
+        "communication",
+        "time_total",
+        "imbalance",
+        "peak_rss_mb",
+        "peak_rss_mb_max",
+        "mesh_reading_mb",
+        "provenance",
+    ];
+    let Value::Object(mut summary) = summary else { panic!("the summary is an object") };
+    OF_THE_RUN.iter().for_each(|key| assert!(summary.remove(*key).is_some(), "no key {key}"));
+    for list in ["newton", "cascade"] {
+        for row in summary[list].as_array_mut().unwrap() {
+            assert!(row.as_object_mut().unwrap().remove("seconds").is_some());
+        }
+    }
+    summary
+}
 
 /// Solves a built-in scene or scene file, with each of `sets` as a `--set`.
 pub fn solve(ranks: usize, scene: &str, sets: &[&str]) -> Run {
