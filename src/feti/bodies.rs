@@ -4,7 +4,8 @@
 
 use std::fmt;
 
-use super::coarse::{Blocks, MODES};
+use super::coarse::MODES;
+use super::coarse::factor::Blocks;
 use super::kernel::RigidModes;
 use crate::comm::{Comm, Shares};
 use crate::decomposition::Subdomain;

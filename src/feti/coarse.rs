@@ -3,16 +3,17 @@
 //! `G x` is local to each subdomain; one all-gather brings it to every rank, each of which holds the sparse Cholesky
 //! factor of `G G'` and solves redundantly: ranks agree to the last bit, and `G'a` needs no further exchange.
 
-use std::cell::RefCell;
-use std::collections::BTreeMap;
+pub mod factor;
+
+use std::cell::OnceCell;
+use std::rc::Rc;
 
 use thiserror::Error;
 
+use self::factor::{Blocks, CoarseFactor, Symbolic};
 use super::bodies::BodyMotions;
-use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use super::gather::Gather;
 use super::kernel::RigidModes;
-use super::ordering::nested_dissection;
 use super::space::RowSpace;
 use crate::comm::{Comm, Shares, all_gather_u64};
 use crate::constraint::Constraints;
@@ -43,6 +44,8 @@ pub struct Coarse<'a> {
     /// For each own subdomain, its (row, slot) in row order.
     own_slots: Vec<Vec<(u32, u32)>>,
     motions: BodyMotions,
+    /// For all rows, and so for any.
+    symbolic: OnceCell<Rc<Symbolic>>,
     /// Of all rows; present once the coarse problem is set up.
     factor: Option<CoarseFactor>,
 }
@@ -84,6 +87,7 @@ impl<'a> Coarse<'a> {
             slot_modes,
             own_slots,
             motions: BodyMotions::new(comm, shares, subdomains, modes),
+            symbolic: OnceCell::new(),
             factor: None,
         }
     }
@@ -102,17 +106,25 @@ impl<'a> Coarse<'a> {
     /// # Errors
     /// If these rows leave a rigid motion free: on every rank.
     pub fn restricted(&self, kept: impl Fn(usize) -> bool) -> Result<CoarseFactor, Floating> {
-        CoarseFactor::new(&self.blocks(kept), self.shares.total())
+        self.factor_of(&self.blocks(kept))
+    }
+
+    /// The factor of blocks, which need not be those of some rows. Collective.
+    ///
+    /// # Errors
+    /// If they are singular: on every rank.
+    pub fn factor_of(&self, blocks: &Blocks) -> Result<CoarseFactor, Floating> {
+        let subdomains = self.shares.total();
+        let symbolic = self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&self.blocks(|_| true), subdomains)));
+        if symbolic.holds(blocks) {
+            return CoarseFactor::new(symbolic, blocks);
+        }
+        CoarseFactor::new(&Rc::new(Symbolic::new(blocks, subdomains)), blocks)
     }
 
     /// The blocks of `G G'` of the kept rows, lower triangle, on every rank. Collective.
     pub fn blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
         share_blocks(self.comm, &self.own_blocks(kept))
-    }
-
-    /// Subdomains of all ranks.
-    pub fn subdomains(&self) -> usize {
-        self.shares.total()
     }
 
     /// `G' motion` of all rows, of six numbers a subdomain. Local.
@@ -235,21 +247,6 @@ impl<'a> Coarse<'a> {
     }
 }
 
-/// For each own subdomain, the rows it takes part in and its slots there.
-fn gather_own_slots(constraints: &Constraints, gather: &Gather, own: usize) -> Vec<Vec<(u32, u32)>> {
-    (0..own)
-        .map(|own| {
-            let mut slots: Vec<(u32, u32)> = gather.entries(own).iter().map(|e| (e.row, e.slot)).collect();
-            slots.dedup();
-            debug_assert!(slots.iter().all(|&(row, slot)| constraints.slots(row as usize).contains(&(slot as usize))));
-            slots
-        })
-        .collect()
-}
-
-/// A 6x6 block of `G G'`, by `(row, column)` subdomain.
-pub type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;
-
 /// The blocks of all ranks, on every rank.
 fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
     let mut message = Vec::new();
@@ -263,85 +260,17 @@ fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
         .collect()
 }
 
-/// The subdomains that each one has a block with, as METIS wants it: begins and neighbours.
-fn adjacency(blocks: &Blocks, subdomains: usize) -> (Vec<i32>, Vec<i32>) {
-    let mut pairs: Vec<(usize, usize)> =
-        blocks.keys().filter(|(a, b)| a != b).flat_map(|&(a, b)| [(a, b), (b, a)]).collect();
-    pairs.sort_unstable();
-    let begins = (0..=subdomains).map(|s| pairs.partition_point(|pair| pair.0 < s) as i32).collect();
-    (begins, pairs.into_iter().map(|pair| pair.1 as i32).collect())
+/// For each own subdomain, the rows it takes part in and its slots there.
+fn gather_own_slots(constraints: &Constraints, gather: &Gather, own: usize) -> Vec<Vec<(u32, u32)>> {
+    (0..own)
+        .map(|own| {
+            let mut slots: Vec<(u32, u32)> = gather.entries(own).iter().map(|e| (e.row, e.slot)).collect();
+            slots.dedup();
+            debug_assert!(slots.iter().all(|&(row, slot)| constraints.slots(row as usize).contains(&(slot as usize))));
+            slots
+        })
+        .collect()
 }
-
-/// Sparse Cholesky factor of `G G'`, whole on every rank.
-pub struct CoarseFactor {
-    cholesky: Analysis,
-    factor: Factor,
-    workspace: RefCell<Workspace>,
-}
-
-impl CoarseFactor {
-    /// Of these blocks.
-    ///
-    /// # Errors
-    /// If they are singular.
-    pub fn new(blocks: &Blocks, subdomains: usize) -> Result<Self, Floating> {
-        let n = MODES * subdomains;
-        let mut columns: Vec<Vec<(u32, f64)>> = vec![Vec::new(); n];
-        for (&(row, column), block) in blocks {
-            for i in 0..MODES {
-                for j in (0..MODES).filter(|&j| row != column || j <= i) {
-                    columns[MODES * column + j].push(((MODES * row + i) as u32, block[MODES * i + j]));
-                }
-            }
-        }
-        let mut begins = vec![0];
-        let (mut rows, mut values) = (Vec::new(), Vec::new());
-        for mut column in columns {
-            column.sort_unstable_by_key(|entry| entry.0);
-            rows.extend(column.iter().map(|entry| entry.0));
-            values.extend(column.iter().map(|entry| entry.1));
-            begins.push(rows.len() as u32);
-        }
-        let lower = Lower { column_begin: &begins, rows: &rows };
-        let order = nested_dissection(&adjacency(blocks, subdomains), MODES as u32);
-        let cholesky = Analysis::ordered(lower, &order);
-        let mut workspace = Workspace::new([&cholesky]);
-        let mut factor = Factor::new(&cholesky, Precision::Double);
-        workspace
-            .factorise(&cholesky, lower, &values, &mut factor)
-            .map_err(|breakdown| Floating { subdomain: breakdown.unknown / MODES })?;
-        let result = Self { cholesky, factor, workspace: RefCell::new(workspace) };
-        // Round-off can hide a free motion: the factor then answers far beyond the size of the matrix.
-        let largest = values.iter().copied().fold(0.0, f64::max);
-        result.check_rank(n, largest).map(|()| result)
-    }
-
-    /// Inverse iteration from a fixed vector without a pattern: a free motion shows as a huge response.
-    fn check_rank(&self, n: usize, largest: f64) -> Result<(), Floating> {
-        let sound = |response: f64| response.abs() * largest < (n as f64).sqrt() / SINGULAR;
-        // Multiples of an irrational number: no motion of a few subdomains is orthogonal to them.
-        let mut x: Vec<f64> = (1..=n).map(|k| (k as f64 * std::f64::consts::SQRT_2).fract() - 0.5).collect();
-        self.solve(&mut x);
-        let worst = x.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        match worst {
-            Some((at, response)) if !sound(*response) => Err(Floating { subdomain: at / MODES }),
-            _ => Ok(()),
-        }
-    }
-
-    /// Numbers in the factor.
-    pub fn length(&self) -> usize {
-        self.cholesky.factor_length()
-    }
-
-    /// `a = (G G')^-1 a`, six numbers a subdomain. Local.
-    pub fn solve(&self, a: &mut [f64]) {
-        self.workspace.borrow_mut().solve(&self.cholesky, &self.factor, a);
-    }
-}
-
-/// A coarse problem conditioned worse than the inverse of this leaves a motion free.
-const SINGULAR: f64 = 1e-12;
 
 #[cfg(test)]
 mod tests;

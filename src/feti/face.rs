@@ -8,7 +8,8 @@
 //! right-hand sides orthogonal to `N`, since `N'C C'a = 0` leaves `C'a = 0`.
 
 use super::bodies::BodyMotions;
-use super::coarse::{Blocks, Coarse, CoarseFactor, Floating, MODES};
+use super::coarse::factor::{Blocks, CoarseFactor};
+use super::coarse::{Coarse, Floating, MODES};
 use super::space::RowSpace;
 
 /// The kept rows with their factor.
@@ -26,8 +27,8 @@ impl CoarseFace {
     /// If these rows leave a motion free that is not one of whole bodies.
     pub fn new(coarse: &Coarse, kept: Vec<bool>) -> Result<Self, Floating> {
         let (mut blocks, motions) = (coarse.blocks(|row| kept[row]), coarse.motions());
-        let subdomains = coarse.subdomains();
-        CoarseFactor::new(&blocks, subdomains)
+        coarse
+            .factor_of(&blocks)
             .map(|factor| (factor, Vec::new()))
             .or_else(|floating| {
                 let free = motions.free(&blocks);
@@ -36,7 +37,7 @@ impl CoarseFace {
                 }
                 let free: Vec<Vec<f64>> = free.iter().map(|motion| motions.amplitudes(motion)).collect();
                 tie(motions, &free, &mut blocks);
-                CoarseFactor::new(&blocks, subdomains).map(|factor| (factor, free))
+                coarse.factor_of(&blocks).map(|factor| (factor, free))
             })
             .map(|(factor, free)| Self { kept, factor, free })
     }

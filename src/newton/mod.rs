@@ -1,7 +1,8 @@
 //! Semismooth Newton for `min J(v) = Psi(v) - f'v` over the admissible displacements (paper, section 3).
 //!
 //! `J` is convex and every iterate is made feasible, so the step of the quadratic model is a descent direction and the
-//! method, damped by `J`, converges from anywhere; where it is damped much, [`secant`] helps. [`step`] is the only place where FETI and the QP solvers meet.
+//! method, damped by `J`, converges from anywhere; where it is damped much, [`secant`] helps. [`step`] is the only place where
+//! FETI and the QP solvers meet.
 
 pub mod basis;
 pub mod certificate;

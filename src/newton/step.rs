@@ -251,7 +251,8 @@ impl<'a> StepSolver<'a> {
         self.secant
     }
 
-    /// Solves for the step at `u`, with a share of the `secant` stiffness; `alive` is told the applications of F so far. Collective.
+    /// Solves for the step at `u`, with a share of the `secant` stiffness; `alive` is told the applications of F so far.
+    /// Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent or the coarse problem is singular.

@@ -1,0 +1,132 @@
+//! Sparse Cholesky factors of `G G'`, whole on every rank.
+//!
+//! Each set of rows has a factor of its own. A set of some rows has no block that the set of all rows has not: all are
+//! factorised in the pattern of the latter, which is ordered and analysed once.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use super::{Floating, MODES};
+use crate::feti::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
+use crate::feti::ordering::nested_dissection;
+
+/// A 6x6 block of `G G'`, by `(row, column)` subdomain, lower triangle.
+pub type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;
+
+/// The subdomains that each one has a block with, as METIS wants it: begins and neighbours.
+fn adjacency(blocks: &Blocks, subdomains: usize) -> (Vec<i32>, Vec<i32>) {
+    let mut pairs: Vec<(usize, usize)> =
+        blocks.keys().filter(|(a, b)| a != b).flat_map(|&(a, b)| [(a, b), (b, a)]).collect();
+    pairs.sort_unstable();
+    let begins = (0..=subdomains).map(|s| pairs.partition_point(|pair| pair.0 < s) as i32).collect();
+    (begins, pairs.into_iter().map(|pair| pair.1 as i32).collect())
+}
+
+/// Where `G G'` has blocks, and the elimination that goes with it.
+pub struct Symbolic {
+    /// The blocks by column, then row.
+    places: Vec<(usize, usize)>,
+    /// Lower triangle by columns.
+    begins: Vec<u32>,
+    rows: Vec<u32>,
+    cholesky: Analysis,
+}
+
+impl Symbolic {
+    /// For these blocks; their values do not count.
+    pub fn new(blocks: &Blocks, subdomains: usize) -> Self {
+        // A subdomain that no row touches has a block of zeros.
+        let mut places: Vec<(usize, usize)> = (0..subdomains).map(|s| (s, s)).collect();
+        places.extend(blocks.keys().map(|&(row, column)| (column, row)));
+        places.sort_unstable();
+        places.dedup();
+        let (mut begins, mut rows) = (vec![0], Vec::new());
+        for of_column in places.chunk_by(|a, b| a.0 == b.0) {
+            for j in 0..MODES {
+                let of_block = |&(column, row): &(usize, usize)| {
+                    (0..MODES).filter(move |&i| row != column || i >= j).map(move |i| (MODES * row + i) as u32)
+                };
+                rows.extend(of_column.iter().flat_map(of_block));
+                begins.push(rows.len() as u32);
+            }
+        }
+        let order = nested_dissection(&adjacency(blocks, subdomains), MODES as u32);
+        let cholesky = Analysis::ordered(Lower { column_begin: &begins, rows: &rows }, &order);
+        Self { places, begins, rows, cholesky }
+    }
+
+    /// Whether it has a place for each of these blocks.
+    pub fn holds(&self, blocks: &Blocks) -> bool {
+        blocks.keys().all(|&(row, column)| self.places.binary_search(&(column, row)).is_ok())
+    }
+
+    /// The values of these blocks in the order of [`Symbolic::rows`]; zero where there is none.
+    fn values(&self, blocks: &Blocks) -> Vec<f64> {
+        let mut values = Vec::with_capacity(self.rows.len());
+        for of_column in self.places.chunk_by(|a, b| a.0 == b.0) {
+            let found: Vec<_> =
+                of_column.iter().map(|&(column, row)| (row, column, blocks.get(&(row, column)))).collect();
+            for j in 0..MODES {
+                for (row, column, block) in &found {
+                    let first = if row == column { j } else { 0 };
+                    values.extend((first..MODES).map(|i| block.map_or(0.0, |block| block[MODES * i + j])));
+                }
+            }
+        }
+        values
+    }
+}
+
+/// The factor for a set of rows.
+pub struct CoarseFactor {
+    symbolic: Rc<Symbolic>,
+    factor: Factor,
+    workspace: RefCell<Workspace>,
+}
+
+impl CoarseFactor {
+    /// Of these blocks, for which `symbolic` has to have places.
+    ///
+    /// # Errors
+    /// If they are singular.
+    pub fn new(symbolic: &Rc<Symbolic>, blocks: &Blocks) -> Result<Self, Floating> {
+        let Symbolic { begins, rows, cholesky, .. } = &**symbolic;
+        let (lower, values) = (Lower { column_begin: begins, rows }, symbolic.values(blocks));
+        let mut workspace = Workspace::new([cholesky]);
+        let mut factor = Factor::new(cholesky, Precision::Double);
+        workspace
+            .factorise(cholesky, lower, &values, &mut factor)
+            .map_err(|breakdown| Floating { subdomain: breakdown.unknown / MODES })?;
+        let result = Self { symbolic: Rc::clone(symbolic), factor, workspace: RefCell::new(workspace) };
+        // Round-off can hide a free motion: the factor then answers far beyond the size of the matrix.
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        result.check_rank(begins.len() - 1, largest).map(|()| result)
+    }
+
+    /// Inverse iteration from a fixed vector without a pattern: a free motion shows as a huge response.
+    fn check_rank(&self, n: usize, largest: f64) -> Result<(), Floating> {
+        let sound = |response: f64| response.abs() * largest < (n as f64).sqrt() / SINGULAR;
+        // Multiples of an irrational number: no motion of a few subdomains is orthogonal to them.
+        let mut x: Vec<f64> = (1..=n).map(|k| (k as f64 * std::f64::consts::SQRT_2).fract() - 0.5).collect();
+        self.solve(&mut x);
+        let worst = x.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        match worst {
+            Some((at, response)) if !sound(*response) => Err(Floating { subdomain: at / MODES }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Numbers in the factor.
+    pub fn length(&self) -> usize {
+        self.symbolic.cholesky.factor_length()
+    }
+
+    /// `a = (G G')^-1 a`, six numbers a subdomain. Local.
+    pub fn solve(&self, a: &mut [f64]) {
+        self.workspace.borrow_mut().solve(&self.symbolic.cholesky, &self.factor, a);
+    }
+}
+
+/// A coarse problem conditioned worse than the inverse of this leaves a motion free.
+const SINGULAR: f64 = 1e-12;
