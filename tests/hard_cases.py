@@ -12,9 +12,9 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "scripts"))
 from bench import hard, pages
 
 
-def case(name, energy, tight=False, applications=100, code=0, residual=1e-9, date="2026-01-01T00:00:00Z"):
+def case(name, energy, tight=False, applications=100, code=0, residual=1e-9, date="2026-01-01T00:00:00Z", error="no descent"):
     summary = {
-        "converged": code == 0, "error": None if code == 0 else "no descent", "energy": energy, "newton_iterations": 7,
+        "converged": code == 0, "error": None if code == 0 else error, "energy": energy, "newton_iterations": 7,
         "smalse_iterations": 0, "active_set_iterations": 9, "hessian_multiplications": applications,
     }
     summary |= {f"residual_{name}": residual for name in hard.RESIDUALS}
@@ -39,12 +39,13 @@ with tempfile.TemporaryDirectory() as name:
     # Of two records the later one counts.
     later = case("nu 0.49", -2.0, applications=60, date="2026-01-02T00:00:00Z")
     assert "No case takes more" in hard_page(folder, later, case("nu 0.49", -2.0, applications=400))
-    # What should converge must, with small residuals; what should not must not.
-    above = "H = 0, above the limit load"
-    for wrong in (case("nu 0.49", -2.0, code=1), case("nu 0.49", -2.0, residual=1e-5), case(above, -2.0)):
+    # What should converge must, with small residuals; what should not must not, and say why.
+    above, why = "H = 0, above the limit load", "the limit load is in between"
+    failed = case("nu 0.49", -2.0, code=1)
+    for wrong in (failed, case("nu 0.49", -2.0, residual=1e-5), case(above, -2.0), case(above, -2.0, code=1)):
         assert f"Not as expected: {wrong['case']}.\n" in hard_page(folder, wrong)
-    page = hard_page(folder, case(above, -2.0, code=1))
-    assert "Every case that was measured ended as expected." in page and f"- {above}: no descent" in page
+    page = hard_page(folder, case(above, -2.0, code=1, error=why))
+    assert "Every case that was measured ended as expected." in page and f"- {above}: {why}" in page
     # In metres the energy is a thousandth.
     units = "m, Pa in place of mm, MPa"
     assert f"| {units} | benchmark | 2.0e-06 |" in hard_page(folder, case(units, -1.000002e-3, tight=True))

@@ -21,8 +21,6 @@ STRICT = TOLERANCES[-1]
 WANTED = [0.1, 0.05, 0.02, 0.01, 0.001, 0.0001]
 
 
-
-
 class Case(typing.NamedTuple):
     scene: str
     meshes: dict
