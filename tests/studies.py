@@ -12,7 +12,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "scripts"))
 from bench import model, scaling, widen
 
 UNITS = {"factors": 1e-10, "operator": 2e-10, "preconditioner": 3e-10, "elements": 4e-6, "products": 5e-8}
-UNITS |= {"projections": 6e-8, "coarse": 2.0, "output": 7e-7}
+UNITS |= {"projections": 6e-8, "coarse": 1.0, "output": 7e-7}
 PROVENANCE = {"commit": "0" * 12, "dirty": False, "cpu": "cpu", "cores": 2, "memory_mb": 1, "rustc": "", "mpi": "", "quiet": True}
 
 
@@ -30,8 +30,7 @@ def record(level, width, ranks, coarse):
         },
     }
     parts = model.predict(UNITS, model.Amounts.of(summary), ranks, coarse)
-    names = {name: phases[0] for name, phases in model.PHASES.items() if ", " not in name}
-    names |= {"projections": "coarse problem", "coarse": "coarse set-up"}
+    names = {name: phases[0] for name, phases in model.PHASES.items()} | {"coarse": "coarse set-up"}
     summary["time"] = {names[part]: seconds for part, seconds in parts.items()}
     summary["time_total"] = sum(parts.values())
     of_run = {"exit_code": 0, "seconds": summary["time_total"], "summary": summary, "repetition": 1}
@@ -84,9 +83,7 @@ with tempfile.TemporaryDirectory() as name:
     assert "Other work ran beside" in scaling.contents(folder, folder)[folder / "scaling.md"]
     assert model.contents(folder, folder) == {}
 
-close(model.fit([[2.0], [2.0]])[0], 0.5)
-assert model.fit([[1.0, 1.0], [1.0, 2.0]]) == [1.0, 0.0], "the second is exact with nothing of it"
-assert min(model.fit([[1.0, 3.0], [1.0, 0.9], [1.0, 1.0]])) >= 0.0
+close(model.fit([2.0, 2.0]), 0.5)
 
 wide = widen.options("two-blocks", 3)
 for name in ("lower", "upper"):

@@ -8,7 +8,7 @@ and A active sets. Each part of its time is a unit cost times an amount of work:
     elements    unit * N * primal unknowns / p
     products    unit * (F + P) * dual unknowns / p
     projections unit * (F + P) * dual unknowns / p, the sides of the coarse problem that are spread over the ranks
-    coarse      unit * (set-up + A * set-up for other rows + (F + P) * solve), whole on every rank, by the curves of kernels.jsonl
+    coarse      set-up + A * set-up for other rows + (F + P) * solve, whole on every rank, by the curves of kernels.jsonl
     output      unit * primal unknowns
 
 Networks are not measured here. What messages cost between nodes is put in from outside, see `Network`.
@@ -118,7 +118,7 @@ PHASES = {
     "preconditioner": ["preconditioner"],
     "elements": ["assembly", "internal forces", "residuals", "scaling", "discretisation"],
     "products": ["inner products"],
-    "projections, coarse": ["coarse problem", "coarse set-up"],
+    "projections": ["coarse problem", "coarse set-up"],
     "output": ["output"],
 }
 """Phases of the summary's `time` that make up a part, or two parts together."""
@@ -129,31 +129,23 @@ def seconds(group, part):
 
 
 def calibrate(groups, coarse):
-    """Unit cost of each part: least squares of the relative error, so that small runs count as much as large ones."""
-    units = {}
-    for parts in PHASES:
-        names = parts.split(", ")
-        works = [Amounts.of(g.first).parts(g.first["ranks"], coarse) for g in groups]
-        shares = [[work[name] / seconds(g, parts) for name in names] for g, work in zip(groups, works)]
-        units |= zip(names, fit(shares))
+    """Unit cost of each part: least squares of the relative error, so that small runs count as much as large ones. The coarse
+    problem is known from its curves: the runs that fit here are too small to tell its cost from that of the projections."""
+    units = {"coarse": 1.0}
+    for part in PHASES:
+        shares = []
+        for group in groups:
+            works = Amounts.of(group.first).parts(group.first["ranks"], coarse)
+            known = works["coarse"] if part == "projections" else 0.0
+            if (rest := seconds(group, part) - known) > 0.0:
+                shares.append(works[part] / rest)
+        units[part] = fit(shares)
     return units
 
 
-def fit(rows):
-    """Numbers x, not negative, with sum_j row_j x_j = 1 for all rows as well as can be; there are one or two."""
-    columns = list(zip(*rows))
-
-    def dot(a, b):
-        return sum(x * y for x, y in zip(a, b))
-
-    alone = [sum(column) / dot(column, column) for column in columns]
-    if len(columns) == 1:
-        return alone
-    (a, b), (p, q) = columns, map(sum, columns)
-    aa, ab, bb = dot(a, a), dot(a, b), dot(b, b)
-    whole = aa * bb - ab * ab
-    x, y = (bb * p - ab * q) / whole, (aa * q - ab * p) / whole
-    return [x, y] if min(x, y) >= 0 else ([alone[0], 0.0] if y < 0 else [0.0, alone[1]])
+def fit(shares):
+    """The number x for which the products `x share` are as near to 1 as can be."""
+    return sum(shares) / sum(share * share for share in shares)
 
 
 def predict(units, amounts, ranks, coarse):
@@ -252,9 +244,9 @@ def contents(folder, raw):
 
 def validation(units, known, held, coarse):
     names = {"factors": "flop", "operator": "byte", "preconditioner": "byte", "elements": "unknown and Newton step"}
-    names |= {"products": "dual unknown and application", "coarse": "second of kernels.jsonl", "output": "unknown"}
+    names |= {"products": "dual unknown and application", "output": "unknown"}
     names["projections"] = names["products"]
-    cost = [[part, f"{unit:.3g}", f"s per {names[part]}"] for part, unit in units.items()]
+    cost = [[part, f"{unit:.3g}", f"s per {names[part]}"] for part, unit in units.items() if part in names]
     yield table(["part", "unit cost", ""], cost)
     yield f"From {len(known)} kinds of runs; all of the largest problem are held back. Predicted with their own counts:\n"
     rows, errors = [], []
