@@ -59,6 +59,12 @@ fn metis_parts_give_the_same_bits_on_1_2_3_and_5_ranks() {
 }
 
 #[test]
+fn sixteen_ranks_on_a_few_cores_give_the_bits_of_one() {
+    let sets = [&COARSE[..2], &["decomposition.method=metis", "decomposition.subdomains=24"]].concat();
+    assert!(assert_independent_of_ranks("two-blocks", &sets, &[1, 16]) >= 24);
+}
+
+#[test]
 fn bodies_from_mesh_files_give_the_same_bits_on_1_2_3_and_5_ranks() {
     let brick = |z: f64| Brick { origin: [0.0, 0.0, z], size: [4.0, 2.0, 2.0], cells: [8, 4, 4] };
     let directory = tempfile::tempdir().unwrap();
