@@ -97,7 +97,9 @@ impl<'a> Coarse<'a> {
     /// # Errors
     /// If it is singular: on every rank.
     pub fn factorise(&mut self) -> Result<(), Floating> {
-        self.factor = Some(self.restricted(|_| true)?);
+        let blocks = self.blocks(|_| true);
+        self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&blocks, self.shares.total())));
+        self.factor = Some(self.factor_of(&blocks)?);
         Ok(())
     }
 
