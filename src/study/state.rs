@@ -206,12 +206,11 @@ fn same(mesh: &MeshOf, there: &[MeshOf]) -> Result<Range<i64>, String> {
             "it has no body {body}, but {known}: name in initial.bodies those that take their state from it"
         ));
     };
-    let name = |of: &MeshOf| format!("{:?}", of.element).to_lowercase();
     if found.element != mesh.element {
         return Err(format!(
             "body {body} is of {} there and of {} here: states go from mesh to the same mesh",
-            name(found),
-            name(mesh)
+            found.element.name(),
+            mesh.element.name()
         ));
     }
     let sizes = |of: &MeshOf| (of.nodes, of.elements);
