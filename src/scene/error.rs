@@ -42,8 +42,8 @@ pub enum SceneError {
     Level,
     /// Meshes from files are as fine as they are.
     #[error(
-        "level {level} refines bodies that a scene describes, and body {body} is from a mesh file: use level 1 and refine the mesh, as with \
-         `gmsh -refine` or `Mesh.MeshSizeFactor = 0.5;`"
+        "level {level} refines bodies that a scene describes, and body {body} is from a mesh file: use level 1 and \
+         refine the mesh, as with `gmsh -refine` or `Mesh.MeshSizeFactor = 0.5;`"
     )]
     LevelOfMesh {
         /// What was asked for.

@@ -1,4 +1,5 @@
-//! The load history: what part of the loads and prescribed displacements (of supports and obstacles) acts at the end of each step.
+//! The load history: what part of the loads and prescribed displacements (of supports and obstacles) acts at the end of
+//! each step.
 
 use std::collections::BTreeMap;
 
