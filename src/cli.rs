@@ -4,6 +4,7 @@
 //! all ranks end with the same code and one message.
 
 mod check;
+mod conduct;
 pub mod keeper;
 mod resume;
 mod solve;
@@ -77,17 +78,6 @@ pub struct Source {
     /// Write a summary of the run as JSON.
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
-}
-
-/// What a run tells beside its log.
-#[derive(Debug, Args)]
-pub struct Insight {
-    /// Write what every rank did when into this directory, one file a rank, for Chrome's trace viewer or Perfetto.
-    #[arg(long, value_name = "DIR")]
-    trace: Option<PathBuf>,
-    /// Write the events of the run as JSON, one object a line.
-    #[arg(long, value_name = "FILE")]
-    log_json: Option<PathBuf>,
 }
 
 /// Why a command gave up; the same on every rank.

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::keeper::{Checkpoints, Signals};
-use super::solve::{Conduct, Plan, carry_out, progress};
-use super::{Failure, Insight, find};
+use super::conduct::Conduct;
+use super::keeper::Signals;
+use super::solve::{Plan, Setting, carry_out};
+use super::{Failure, find};
 use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
@@ -31,13 +32,8 @@ pub struct Resume {
     /// Where the summary goes, if not to where it was to go.
     #[arg(long, value_name = "FILE")]
     summary: Option<PathBuf>,
-    /// Life signs inside a Newton step: auto, plain or off.
-    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = progress)]
-    progress: Mode,
     #[command(flatten)]
-    checkpoints: Checkpoints,
-    #[command(flatten)]
-    insight: Insight,
+    conduct: Conduct,
 }
 
 /// What a checkpoint is written by; others are not understood.
@@ -56,7 +52,7 @@ pub(super) fn labels(plan: &Plan, scene: &str) -> [(&'static str, String); 4] {
 /// If the scene has changed, the checkpoint is of no use, or files cannot be read or written.
 pub fn resume(arguments: Resume, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
     let timer = Timer::start();
-    let Resume { file, out, summary, progress, checkpoints, insight } = arguments;
+    let Resume { file, out, summary, conduct } = arguments;
     let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
     let (path, checkpoint) = open(comm, &file, &mut monitor)?;
     let unreadable = |reason: String| Failure::Input(format!("cannot go on from {}: {reason}", path.display()));
@@ -83,14 +79,7 @@ pub fn resume(arguments: Resume, comm: &dyn Comm, signals: Signals) -> Result<i3
     }
     plan.source.summary = summary.or(plan.source.summary);
     let out = out.unwrap_or_else(|| file.parent().map(Path::to_owned).unwrap_or_default());
-    carry_out(
-        plan,
-        &found,
-        &scene,
-        Some(checkpoint),
-        Conduct { timer, out, progress, checkpoints, insight, signals },
-        comm,
-    )
+    carry_out(plan, &found, &scene, Some(checkpoint), Setting { timer, out, conduct, signals }, comm)
 }
 
 /// Opens a checkpoint, or the one before.

@@ -6,15 +6,15 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::keeper::{Checkpoints, Keeper, Signals};
+use super::conduct::Conduct;
+use super::keeper::{Keeper, Signals};
 use super::resume::{labels, unfit};
-use super::{Failure, Found, Insight, Source, describe_run, find, run_name, warnings};
+use super::{Failure, Found, Source, describe_run, find, run_name, warnings};
 use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::json::JsonLines;
 use crate::monitor::metered::Metered;
-use crate::monitor::progress::Mode;
 use crate::monitor::table::{Phase, PhaseTable};
 use crate::monitor::timing::Timer;
 use crate::monitor::trace;
@@ -48,13 +48,8 @@ pub struct Solve {
     /// Solve half the level first, and so on, and start from there: auto (where it pays), on or off.
     #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
     cascade: Cascade,
-    /// Life signs inside a Newton step: auto, plain or off.
-    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = progress)]
-    progress: Mode,
     #[command(flatten)]
-    checkpoints: Checkpoints,
-    #[command(flatten)]
-    insight: Insight,
+    conduct: Conduct,
 }
 
 /// Tolerance of coarser levels: well below what halving the cells changes.
@@ -86,15 +81,6 @@ impl Cascade {
     }
 }
 
-pub(super) fn progress(text: &str) -> Result<Mode, String> {
-    match text {
-        "auto" => Ok(Mode::Auto),
-        "plain" => Ok(Mode::Plain),
-        "off" => Ok(Mode::Off),
-        _ => Err("it is auto, plain or off".into()),
-    }
-}
-
 /// What a run has to do; a checkpoint says what is left.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Plan {
@@ -110,13 +96,11 @@ pub(super) struct Plan {
 }
 
 /// How and where a plan is carried out.
-pub(super) struct Conduct {
+pub(super) struct Setting {
     /// Runs since the program does.
     pub timer: Timer,
     pub out: PathBuf,
-    pub progress: Mode,
-    pub checkpoints: Checkpoints,
-    pub insight: Insight,
+    pub conduct: Conduct,
     pub signals: Signals,
 }
 
@@ -126,7 +110,7 @@ pub(super) struct Conduct {
 /// If the scene is bad or files cannot be read or written.
 pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
     let timer = Timer::start();
-    let Solve { mut source, out, qp, preconditioner, accuracy, cascade, progress, checkpoints, insight } = arguments;
+    let Solve { mut source, out, qp, preconditioner, accuracy, cascade, conduct } = arguments;
     let shorthand = |key: &str, value: Option<String>| value.map(|v| format!("solver.{key}={v}"));
     source.sets.extend(shorthand("qp", qp));
     source.sets.extend(shorthand("preconditioner", preconditioner));
@@ -136,7 +120,7 @@ pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32,
     let mut levels = cascade.before(source.level, &scene);
     levels.push(source.level);
     let plan = Plan { source, levels, yielding: None, rows: Vec::new() };
-    carry_out(plan, &found, &scene, None, Conduct { timer, out, progress, checkpoints, insight, signals }, comm)
+    carry_out(plan, &found, &scene, None, Setting { timer, out, conduct, signals }, comm)
 }
 
 /// Solves level after level and writes results, from where a checkpoint of the first level stands if there is one. `found`
@@ -146,10 +130,11 @@ pub(super) fn carry_out(
     found: &Found,
     scene: &Scene,
     mut checkpoint: Option<Checkpoint>,
-    conduct: Conduct,
+    setting: Setting,
     comm: &dyn Comm,
 ) -> Result<i32, Failure> {
-    let Conduct { mut timer, out, progress, checkpoints, insight: Insight { trace, log_json }, signals } = conduct;
+    let Setting { mut timer, out, conduct, signals } = setting;
+    let Conduct { progress, checkpoints, trace, log_json } = conduct;
     let mut monitor = Monitor::of_rank(comm.rank(), progress);
     if trace.is_some() {
         timer.keep_spans();
