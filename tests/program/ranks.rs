@@ -3,7 +3,7 @@
 
 use crate::common::fields::Fields;
 use crate::common::msh::{Form, write};
-use crate::common::{COARSE, Run, only_result, scene_file, solve};
+use crate::common::{COARSE, Run, assert_close, only_result, scene_file, solve};
 use fetiplast::mesh::Brick;
 use serde_json::{Map, Value};
 
@@ -16,14 +16,13 @@ fn result(run: &Run) -> Map<String, Value> {
     summary
 }
 
-/// Fails unless all runs have the same results to the last bit; returns the number of subdomains.
-fn assert_independent_of_ranks(scene: &str, sets: &[&str], all_ranks: &[usize]) -> u64 {
+/// Fails unless all runs have the same results to the last bit, which it returns.
+fn assert_independent_of_ranks(scene: &str, sets: &[&str], all_ranks: &[usize]) -> Map<String, Value> {
     let mut first = None;
-    let mut subdomains = 0;
     for &ranks in all_ranks {
         let run = solve(ranks, scene, sets).converged();
         let summary = result(&run);
-        subdomains = summary["subdomains"].as_u64().unwrap();
+        let subdomains = summary["subdomains"].as_u64().unwrap();
         let fields = Fields::read(&run.result());
         assert_eq!(fields.cells_of_pieces().len(), ranks, "one piece a rank");
         let mut bits = fields.bits(&["VTKHDF/PointData", "VTKHDF/CellData", "convergence"]);
@@ -44,58 +43,78 @@ fn assert_independent_of_ranks(scene: &str, sets: &[&str], all_ranks: &[usize]) 
         }
         assert!(points == *points_1 && fields.elements == *elements_1, "another mesh on {ranks} ranks");
     }
-    subdomains
+    first.expect("some ranks").0
 }
 
 #[test]
 fn bricks_give_the_same_bits_on_1_2_3_and_5_ranks() {
-    assert_eq!(assert_independent_of_ranks("two-blocks", &COARSE, &RANKS), 6);
+    assert_eq!(assert_independent_of_ranks("two-blocks", &COARSE, &RANKS)["subdomains"], 6);
 }
 
 #[test]
 fn metis_parts_give_the_same_bits_on_1_2_3_and_5_ranks() {
     let sets = [&COARSE[..2], &["decomposition.method=metis", "decomposition.subdomains=7"]].concat();
-    assert!(assert_independent_of_ranks("two-blocks", &sets, &RANKS) >= 7);
+    assert!(assert_independent_of_ranks("two-blocks", &sets, &RANKS)["subdomains"].as_u64() >= Some(7));
 }
 
 #[test]
 fn sixteen_ranks_on_a_few_cores_give_the_bits_of_one() {
     let sets = [&COARSE[..2], &["decomposition.method=metis", "decomposition.subdomains=24"]].concat();
-    assert!(assert_independent_of_ranks("two-blocks", &sets, &[1, 16]) >= 24);
+    assert!(assert_independent_of_ranks("two-blocks", &sets, &[1, 16])["subdomains"].as_u64() >= Some(24));
 }
 
+/// A block from a mesh file that a rigid ball presses into, plastic under it.
 #[test]
-fn bodies_from_mesh_files_give_the_same_bits_on_1_2_3_and_5_ranks() {
-    let brick = |z: f64| Brick { origin: [0.0, 0.0, z], size: [4.0, 2.0, 2.0], cells: [8, 4, 4] };
+fn a_mesh_file_cut_into_1_7_24_and_60_parts_gives_one_energy_and_the_same_bits_on_1_2_and_3_ranks() {
+    let block = Brick { origin: [0.0; 3], size: [4.0, 4.0, 2.0], cells: [8, 8, 4] };
     let directory = tempfile::tempdir().unwrap();
-    let mesh = write(&[("lower", brick(0.0)), ("upper", brick(2.0))], Form::Binary41);
-    std::fs::write(directory.path().join("two.msh"), mesh).unwrap();
-    let body = |name: &str| {
-        format!(
-            "[body.{name}]\nmaterial = 'steel'\nelement = 'tet4'\ngmsh = {{ file = 'two.msh', volume = '{name}' }}\n"
-        )
-    };
-    let text = "[material.steel]\nyoung = 210.0\npoisson = 0.3\nyield_stress = 0.3\nhardening = 10.0\n".to_owned()
-        + &body("lower")
-        + &body("upper")
-        + "[support.left]\nsurface = 'lower.xmin'\nfix = ['x', 'y', 'z']\n\
-           [support.right]\nsurface = 'upper.xmax'\nfix = ['x', 'y', 'z']\n\
-           [load.top]\nsurface = 'upper.zmax'\ntraction = [0.0, 0.0, -0.05]\n\
-           [contact.joint]\nslave = 'upper.zmin'\nmaster = 'lower.zmax'\n";
-    let scene = scene_file(directory.path(), &text);
-    assert!(assert_independent_of_ranks(&scene, &["decomposition.subdomains=7"], &RANKS) >= 7);
+    std::fs::write(directory.path().join("block.msh"), write(&[("block", block)], Form::Binary41)).unwrap();
+    let scene = scene_file(
+        directory.path(),
+        r#"
+        [material.steel]
+        young = 210.0
+        poisson = 0.3
+        yield_stress = 0.3
+        hardening = 10.0
+        [body.block]
+        material = "steel"
+        element = "tet4"
+        gmsh = { file = "block.msh" }
+        [support.bottom]
+        surface = "block.zmin"
+        fix = ["x", "y", "z"]
+        [contact.ball]
+        slave = "block.zmax"
+        rigid = { sphere = { centre = [2.1, 1.9, 4.9], radius = 3.0 } }
+        "#,
+    );
+    let tight = ["solver.newton_tolerance=1e-8", "solver.residual_tolerance=1e-10", "solver.qp_tolerance=1e-11"];
+    let mut whole: Option<Map<String, Value>> = None;
+    for parts in [1, 7, 24, 60] {
+        let cut = format!("decomposition.subdomains={parts}");
+        let summary = assert_independent_of_ranks(&scene, &[&tight[..], &[&cut]].concat(), &[1, 2, 3]);
+        assert!(summary["subdomains"].as_u64() >= Some(parts));
+        let whole = whole.get_or_insert_with(|| summary.clone());
+        for key in ["energy", "internal_energy", "max_displacement", "max_von_mises"] {
+            let [found, expected] = [&summary, &*whole].map(|s| s[key].as_f64().unwrap());
+            assert_close(key, found, expected, 1e-8);
+        }
+        assert_eq!(summary["plastic_elements"], whole["plastic_elements"]);
+        assert!(summary["plastic_elements"].as_u64() > Some(100) && summary["active_contacts"].as_u64() > Some(4));
+    }
 }
 
 #[test]
 fn preconditioned_active_sets_give_the_same_bits_on_1_2_3_and_5_ranks() {
     let sets = [&COARSE[..], &["solver.qp=active-set", "solver.preconditioner=dirichlet"]].concat();
-    assert_eq!(assert_independent_of_ranks("two-blocks", &sets, &RANKS), 6);
+    assert_eq!(assert_independent_of_ranks("two-blocks", &sets, &RANKS)["subdomains"], 6);
 }
 
 #[test]
 fn ranks_without_a_subdomain_stay_idle_and_change_nothing() {
     let sets = [&COARSE[..2], &["decomposition.cells=[15, 5, 5]"]].concat();
-    assert_eq!(assert_independent_of_ranks("two-blocks", &sets, &[1, 3, 5]), 2);
+    assert_eq!(assert_independent_of_ranks("two-blocks", &sets, &[1, 3, 5])["subdomains"], 2);
     let warned = |ranks| solve(ranks, "bar", &[]).converged().summary()["warnings"].to_string();
     assert!(warned(3).contains("1 of 3 ranks stay idle: there are only 2 subdomains"));
     assert_eq!(warned(2), "[]");
@@ -103,13 +122,13 @@ fn ranks_without_a_subdomain_stay_idle_and_change_nothing() {
 
 #[test]
 fn a_scene_without_contact_gives_the_same_bits_on_1_2_3_and_5_ranks() {
-    assert_eq!(assert_independent_of_ranks("shear", &[], &RANKS), 8);
+    assert_eq!(assert_independent_of_ranks("shear", &[], &RANKS)["subdomains"], 8);
 }
 
 #[test]
 fn contact_with_an_obstacle_gives_the_same_bits_on_1_2_3_and_5_ranks() {
     let sets = ["body.cube.brick.cells=[8, 8, 8]", "decomposition.cells=[4, 4, 4]"];
-    assert_eq!(assert_independent_of_ranks("step-42", &sets, &RANKS), 8);
+    assert_eq!(assert_independent_of_ranks("step-42", &sets, &RANKS)["subdomains"], 8);
 }
 
 #[test]
@@ -123,5 +142,5 @@ fn curved_interfaces_of_a_mesh_file_give_the_same_bits_on_1_2_and_3_ranks() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/ring.toml");
     let mesh = ["inner", "outer"].map(|body| format!("body.{body}.gmsh.file='../tests/meshes/ring-8-6.msh'"));
     let sets = [&mesh[0], &mesh[1], "decomposition.subdomains=24"];
-    assert!(assert_independent_of_ranks(scene, &sets, &[1, 2, 3]) >= 24);
+    assert!(assert_independent_of_ranks(scene, &sets, &[1, 2, 3])["subdomains"].as_u64() >= Some(24));
 }
