@@ -68,14 +68,15 @@ impl Meshes {
                 Shape::Mesh(Counts { nodes, cells, elements })
             }
         };
-        let bodies = number_bodies(scene.body.values().map(|body| (kind(body.element), shape(body))));
+        let bodies = number_bodies(scene.body.values().map(|body| (kind(body.element), shape(body), materials(scene, body))));
         Ok(Self { bodies, solids, warnings: texts[2..].to_vec() })
     }
 }
 
 /// The bodies of a scene of bricks alone.
 pub fn bricks(scene: &Scene) -> Option<Vec<BodyMesh>> {
-    let shapes = scene.body.values().map(|body| Some((kind(body.element), brick(body.brick()?))));
+    let shape = |body: &scene::Body| Some((kind(body.element), brick(body.brick()?), materials(scene, body)));
+    let shapes = scene.body.values().map(shape);
     shapes.collect::<Option<Vec<_>>>().map(number_bodies)
 }
 
@@ -89,6 +90,13 @@ fn kind(element: scene::Element) -> Kind {
 
 fn brick(b: &scene::Brick) -> Shape {
     Shape::Brick(Brick { origin: b.origin, size: b.size, cells: b.cells })
+}
+
+/// Numbers of a body's materials among those of the scene, ascending.
+fn materials(scene: &Scene, body: &scene::Body) -> Vec<usize> {
+    let names = body.material.names();
+    let number = |name: &&str| scene.material.keys().position(|known| known == name);
+    names.iter().map(|name| number(name).expect("a checked scene names its materials")).collect()
 }
 
 /// What rank 0 reads.
@@ -127,15 +135,16 @@ fn read(scene: &Scene) -> Result<Found, MeshError> {
         for FromFile { index, name, gmsh, kind } in bodies {
             let surfaces: Vec<&str> = surfaces_of(scene, name).into_iter().collect();
             let problem = |problem: Problem| MeshError::Bad(format!("body.{name}: {}: {problem}", path.display()));
-            let mut mesh = msh.volume(gmsh.volume.as_deref(), &surfaces, *kind).map_err(problem)?;
+            let volumes: Vec<&str> = gmsh.volumes().iter().map(|name| &name[..]).collect();
+            let mut mesh = msh.body(&volumes, &surfaces, *kind).map_err(problem)?;
+            join_equal(&scene.body[*name], &volumes, &mut mesh);
             place(gmsh, &mut mesh);
             found.warnings.extend(check(scene, name, &mesh)?);
             found.solids.insert(*index, mesh);
         }
-        let used: BTreeSet<_> = bodies.iter().map(|b| b.gmsh.volume.clone()).collect();
-        let unused: Vec<_> =
-            msh.volume_names().into_iter().filter(|name| !used.contains(&Some(name.clone()))).collect();
-        if !used.contains(&None) && !unused.is_empty() {
+        let used: BTreeSet<_> = bodies.iter().flat_map(|b| b.gmsh.volumes()).collect();
+        let unused: Vec<_> = msh.volume_names().into_iter().filter(|name| !used.contains(name)).collect();
+        if bodies.iter().all(|b| b.gmsh.volume.is_some()) && !unused.is_empty() {
             found.warnings.push(format!("{}: no body is made of volume {}", path.display(), unused.join(", ")));
         }
     }
@@ -167,6 +176,19 @@ fn mapped(shape: &scene::Shape) -> Option<Mapped> {
 /// Names of a body's surfaces that the scene uses.
 fn surfaces_of<'a>(scene: &'a Scene, body: &str) -> BTreeSet<&'a str> {
     scene.surfaces().filter(|surface| surface.body == body).map(|surface| &surface.surface[..]).collect()
+}
+
+/// Makes one region of volumes with one material.
+fn join_equal(body: &scene::Body, volumes: &[&str], mesh: &mut SolidMesh) {
+    let names: Vec<&str> = body.material.names().into_iter().collect();
+    if names.len() == 1 {
+        mesh.regions.clear();
+    }
+    let region = |volume: &&str| names.iter().position(|name| body.material.of(volume) == Some(name));
+    let of_volumes: Vec<Option<usize>> = volumes.iter().map(region).collect();
+    for region in &mut mesh.regions {
+        *region = of_volumes[*region as usize].expect("every volume of a checked scene has a material") as u32;
+    }
 }
 
 fn place(gmsh: &Gmsh, mesh: &mut SolidMesh) {

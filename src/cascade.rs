@@ -111,7 +111,7 @@ pub fn closed_contacts(
 pub fn yielding<'a>(
     comm: &dyn Comm,
     coarse: (&[BodyMesh], &[Subdomain], &Torn),
-    material: impl Fn(usize) -> &'a Material,
+    material: impl Fn(&Subdomain) -> &'a Material,
     fine: (&[BodyMesh], [usize; 3]),
 ) -> Vec<Vec<bool>> {
     let (coarse_bodies, subdomains, u) = coarse;
@@ -119,7 +119,7 @@ pub fn yielding<'a>(
     let mut found = HashSet::new();
     for (subdomain, u) in subdomains.iter().zip(u) {
         let (body, brick) = (subdomain.body, brick(&coarse_bodies[subdomain.body]));
-        for nodes in internal::yielding(subdomain, material(body), &[], u) {
+        for nodes in internal::yielding(subdomain, material(subdomain), &[], u) {
             let sum = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>();
             let centre = |a: usize| sum(a) / nodes.len() as f64;
             let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);

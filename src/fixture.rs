@@ -140,7 +140,7 @@ impl<'a> Setup<'a> {
     }
 
     pub fn material(&self, own: usize) -> &Material {
-        &self.discrete.materials[self.subdomains()[own].body]
+        &self.discrete.materials[self.subdomains()[own].material]
     }
 
     pub fn coarse(&self) -> Result<Coarse<'a>, Floating> {

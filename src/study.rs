@@ -21,7 +21,7 @@ use crate::cascade;
 use crate::comm::Comm;
 use crate::constraint::Kind;
 use crate::contact::ContactError;
-use crate::decomposition::Cut;
+use crate::decomposition::{Cut, Subdomain};
 use crate::decomposition::sums::NodeSums;
 use crate::decomposition::twins::{alike, twins};
 use crate::feti::Torn;
@@ -138,7 +138,7 @@ pub fn expected_yielding(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &S
     let bodies = bodies::bricks(fine)?;
     let Cut::Bricks(cells) = discrete::cut(&fine.decomposition, &bodies) else { return None };
     let (coarse, solved) = coarse;
-    let material = |body: usize| &coarse.materials[body];
+    let material = |s: &Subdomain| &coarse.materials[s.material];
     let coarse = (&coarse.bodies[..], &coarse.decomposition.subdomains[..], &solved.u);
     Some(cascade::yielding(comm, coarse, material, (&bodies, cells)))
 }
@@ -200,7 +200,7 @@ pub fn solve_from(
     let (loading::Conditions { loads, rhs }, stages) = conditions::stages(scene, discrete, &|| gather.zeros());
     let mut problem = TornProblem {
         subdomains,
-        materials: subdomains.iter().map(|s| discrete.materials[s.body]).collect(),
+        materials: subdomains.iter().map(|s| discrete.materials[s.material]).collect(),
         modes: &modes,
         loads,
         rhs,
@@ -210,7 +210,7 @@ pub fn solve_from(
         coupling: RefCell::new(Coupling::new(constraints)),
         space: &space,
         sums: &sums,
-        yields: discrete.materials.iter().any(|m| m.yield_stress.is_some()),
+        yields: discrete.bodies.iter().flat_map(|b| &b.materials).any(|&m| discrete.materials[m].yield_stress.is_some()),
     };
     timer.time("coarse set-up", || held::at_all_stages(scene, discrete, &mut coarse, &space, &modes, &stages))?;
     let solver = &scene.solver;

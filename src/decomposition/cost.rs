@@ -9,9 +9,9 @@
 /// Elements to the power 4/5 for each subdomain.
 const SCALE: f64 = 300.0;
 
-/// Subdomains for so many elements in so many bodies, which need one each.
-pub fn subdomains(elements: u64, bodies: usize) -> usize {
-    ((elements as f64).powf(0.8) / SCALE).round().max(bodies as f64) as usize
+/// Subdomains for so many elements in so many regions of bodies, which need one each.
+pub fn subdomains(elements: u64, regions: usize) -> usize {
+    ((elements as f64).powf(0.8) / SCALE).round().max(regions as f64) as usize
 }
 
 #[cfg(test)]

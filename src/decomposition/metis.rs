@@ -1,8 +1,8 @@
 //! Partition of each body's dual graph by METIS (Karypis and Kumar 1998), on rank 0. The others receive their own
 //! subdomains: the numbers of elements of bricks, which they generate, and all of other bodies.
 //!
-//! Bodies are cut one by one: a part never spans two bodies. Elements of a body cost the same, as they have one kind and
-//! one material; between bodies they count as so many linear tetrahedra. Contact surfaces stay on few subdomains because cutting between two elements at them counts
+//! Regions of bodies are cut one by one: a part never spans two bodies or two materials. Elements of a body cost the same, as
+//! they have one kind; between bodies they count as so many linear tetrahedra. Contact surfaces stay on few subdomains because cutting between two elements at them counts
 //! as much as cutting [`AT_CONTACT`] other faces: on the benchmark, cut into 12 to 288 parts, that leaves 16 to 43 %
 //! fewer subdomains in contact for at most 5 % more dual unknowns.
 
@@ -41,8 +41,7 @@ pub(crate) fn own_subdomains(bodies: &Bodies, parts: usize, comm: &dyn Comm) -> 
             let message = &mut outgoing[shares.owner(id)];
             message.push(body as u64);
             if let Some(mesh) = bodies.meshes.get(&body) {
-                let first_node = bodies.bodies[body].first_node;
-                Subdomain::of_mesh((id, body), first_node, mesh, elements, &surfaces[&body]).pack(message);
+                Subdomain::of_mesh((id, body), &bodies.bodies[body], mesh, elements, &surfaces[&body]).pack(message);
             } else {
                 message.extend([id as u64, elements.len() as u64]);
                 message.extend(elements);
@@ -119,8 +118,10 @@ fn faces(bodies: &Bodies, body: usize) -> HashMap<Vec<u32>, Vec<usize>> {
 /// The elements of a body, those that share a face being neighbours.
 struct DualGraph {
     neighbours: Neighbours,
-    /// Elements of each face-connected piece of the body, ascending.
+    /// Elements of each face-connected piece of each region of the body, ascending.
     pieces: Vec<Vec<u32>>,
+    /// Piece of each element.
+    piece_of: Vec<i32>,
     /// Whether an element has a node on a contact surface.
     at_contact: Vec<bool>,
 }
@@ -137,13 +138,14 @@ impl DualGraph {
         };
         let nodes = mesh.counts().nodes as usize;
         let neighbours = Neighbours::new(nodes, &elements);
-        let mut piece_of = vec![0; elements.len()];
+        let region = |element| bodies.meshes.get(&body).map_or(0, |mesh| mesh.region(element) as i32);
+        let mut piece_of: Vec<i32> = (0..elements.len()).map(region).collect();
         let mut pieces = vec![Vec::new(); split_into_pieces(&mut piece_of, &neighbours)];
-        (0..).zip(piece_of).for_each(|(element, piece)| pieces[piece as usize].push(element));
+        (0..).zip(&piece_of).for_each(|(element, &piece)| pieces[piece as usize].push(element));
         let mut touching = vec![false; nodes];
         contact_nodes(bodies, body).into_iter().for_each(|node| touching[node as usize] = true);
         let at_contact = elements.iter().map(|nodes| nodes.iter().any(|&n| touching[n as usize])).collect();
-        Self { neighbours, pieces, at_contact }
+        Self { neighbours, pieces, piece_of, at_contact }
     }
 
     /// Part of each element, and the number of parts, each of which is face-connected; `wanted` tells how many parts to
@@ -166,7 +168,8 @@ impl DualGraph {
     fn cut(&self, piece: &[u32], local: &[i32], wanted: i32) -> Vec<i32> {
         let (mut begin, mut adjacency, mut weights) = (vec![0], Vec::new(), Vec::new());
         for &element in piece {
-            for other in self.neighbours.of(element as usize) {
+            let inside = |other: &u32| self.piece_of[*other as usize] == self.piece_of[element as usize];
+            for other in self.neighbours.of(element as usize).filter(inside) {
                 adjacency.push(local[other as usize]);
                 let both = self.at_contact[element as usize] && self.at_contact[other as usize];
                 weights.push(if both { AT_CONTACT } else { 1 });

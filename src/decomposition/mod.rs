@@ -48,6 +48,8 @@ pub struct BodyMesh {
     pub kind: Kind,
     /// Where nodes and elements come from.
     pub shape: Shape,
+    /// Numbers of the materials of its regions, ascending.
+    pub materials: Vec<usize>,
     /// Number of nodes of all bodies before this one.
     pub first_node: u64,
 }
@@ -156,7 +158,7 @@ pub struct Bodies<'a> {
 pub enum Cut {
     /// Boxes of so many cells; all bodies are bricks, and these divide their cells.
     Bricks([usize; 3]),
-    /// So many parts in all, by METIS, at least one a body.
+    /// So many parts in all, by METIS, at least one for each region of each body.
     Metis(usize),
 }
 
@@ -179,12 +181,12 @@ impl Decomposition {
 }
 
 /// Lays bodies one behind the other in one numbering of nodes.
-pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape)>) -> Vec<BodyMesh> {
+pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape, Vec<usize>)>) -> Vec<BodyMesh> {
     let mut first_node = 0;
     shapes
         .into_iter()
-        .map(|(kind, shape)| {
-            let body = BodyMesh { first_node, kind, shape };
+        .map(|(kind, shape, materials)| {
+            let body = BodyMesh { first_node, kind, shape, materials };
             first_node += body.counts().nodes;
             body
         })

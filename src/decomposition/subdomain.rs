@@ -16,7 +16,7 @@ pub struct Facet {
     pub nodes: Vec<u32>,
 }
 
-/// A face-connected set of elements of one kind. Local nodes ascend in global numbering, elements likewise, so that congruent
+/// A face-connected set of elements of one kind and material. Local nodes ascend in global numbering, elements likewise, so that congruent
 /// boxes of one brick are numbered alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subdomain {
@@ -24,6 +24,8 @@ pub struct Subdomain {
     pub id: usize,
     /// Index of its body.
     pub body: usize,
+    /// Number of its material.
+    pub material: usize,
     /// Global number of each local node, ascending.
     pub nodes: Vec<u64>,
     /// Coordinates of the local nodes.
@@ -43,7 +45,7 @@ impl Subdomain {
     /// From its elements (kind, and numbers of nodes within the body), the places of nodes and the ways between two, and
     /// the named surfaces that a face is on.
     fn new(
-        (id, body): (usize, usize),
+        (id, body, material): (usize, usize, usize),
         first_node: u64,
         (kind, of_elements): (Kind, &[u64]),
         point: impl Fn(u64) -> [f64; 3],
@@ -69,7 +71,7 @@ impl Subdomain {
             facets.extend(surfaces(&global).into_iter().map(|surface| Facet { surface, nodes: face.clone() }));
         }
         let nodes = nodes.iter().map(|node| first_node + node).collect();
-        Self { id, body, nodes, points, shape, elements, facets, boundary }
+        Self { id, body, material, nodes, points, shape, elements, facets, boundary }
     }
 
     /// Of a brick, from the numbers of its elements within the body (ascending).
@@ -77,7 +79,8 @@ impl Subdomain {
     /// # Panics
     /// If the body is no brick.
     pub fn of_brick(id: usize, bodies: &Bodies, body: usize, elements: &[u64]) -> Self {
-        let BodyMesh { first_node, kind, .. } = bodies.bodies[body];
+        let BodyMesh { first_node, kind, ref materials, .. } = bodies.bodies[body];
+        let of = (id, body, materials[0]);
         let lattice = bodies.bodies[body].lattice().expect("the body is a brick");
         let on = |surface: &Surface, face: &[u64]| match surface.patch {
             Patch::Face(side) => face.iter().all(|&node| lattice.is_on(side, lattice.node_position(node))),
@@ -89,14 +92,14 @@ impl Subdomain {
         };
         let nodes: Vec<u64> = elements.iter().flat_map(|&e| bodies.bodies[body].element(e)).collect();
         let point = |node| lattice.coordinates(lattice.node_position(node));
-        Self::new((id, body), first_node, (kind, &nodes), point, |from, to| lattice.way(from, to), surfaces)
+        Self::new(of, first_node, (kind, &nodes), point, |from, to| lattice.way(from, to), surfaces)
     }
 
-    /// Of a mesh, from the numbers of its elements within the body (ascending), and the named surfaces of its faces,
-    /// by ascending nodes.
+    /// Of a mesh, from the numbers of its elements within the body (ascending, all in one region), and the named surfaces
+    /// of its faces, by ascending nodes.
     pub fn of_mesh(
         (id, body): (usize, usize),
-        first_node: u64,
+        &BodyMesh { first_node, ref materials, .. }: &BodyMesh,
         mesh: &SolidMesh,
         elements: &[u64],
         surfaces: &HashMap<Vec<u32>, Vec<usize>>,
@@ -109,7 +112,8 @@ impl Subdomain {
         };
         let point = |node: u64| mesh.points[node as usize];
         let way = |from, to| relative(point(from), point(to));
-        Self::new((id, body), first_node, (mesh.elements.kind(), &nodes), point, way, surfaces)
+        let material = materials[mesh.region(elements[0] as usize)];
+        Self::new((id, body, material), first_node, (mesh.elements.kind(), &nodes), point, way, surfaces)
     }
 
     /// Number of local unknowns.
@@ -124,8 +128,8 @@ impl Subdomain {
 
     /// As numbers, for sending; of subdomains of meshes only, whose shape follows from their points.
     pub fn pack(&self, message: &mut Vec<u64>) {
-        let Self { id, body, nodes, points, elements, facets, boundary, .. } = self;
-        message.extend([*id, *body, nodes.len(), elements.len(), facets.len(), boundary.len()].map(|n| n as u64));
+        let Self { id, body, material, nodes, points, elements, facets, boundary, .. } = self;
+        message.extend([*id, *body, *material, nodes.len(), elements.len(), facets.len(), boundary.len()].map(|n| n as u64));
         message.extend(nodes);
         message.extend(points.as_flattened().iter().map(|x| x.to_bits()));
         pack_pairs(elements.nodes(), message);
@@ -140,12 +144,13 @@ impl Subdomain {
     pub fn unpack(kind: Kind, message: &mut impl Iterator<Item = u64>) -> Option<Self> {
         let id = message.next()? as usize;
         let mut next = || message.next().expect("a packed subdomain is whole");
-        let [body, nodes, elements, facets, boundary] = [(); 5].map(|()| next() as usize);
+        let [body, material, nodes, elements, facets, boundary] = [(); 6].map(|()| next() as usize);
         let of_nodes: Vec<u64> = (0..nodes).map(|_| next()).collect();
         let points: Vec<[f64; 3]> = (0..nodes).map(|_| [(); 3].map(|()| f64::from_bits(next()))).collect();
         Some(Self {
             id,
             body,
+            material,
             nodes: of_nodes,
             shape: points.iter().map(|&point| relative(points[0], point)).collect(),
             points,

@@ -1,16 +1,17 @@
-//! Sums over the elements around each node, where these are in several subdomains.
+//! Sums over the elements of one material around each node, where these are in several subdomains.
 
 use std::ops::Range;
 
-use super::Decomposition;
-use crate::comm::Comm;
+use super::{Decomposition, InterfaceNode};
+use crate::comm::{Comm, all_gather_u64};
 
-/// Adds up what the copies of a node hold, in subdomain order: the same bits on every rank that has a copy.
+/// Adds up what the copies of a node in subdomains of one material hold, in subdomain order: the same bits on every rank that
+/// has a copy.
 pub struct NodeSums<'a> {
     comm: &'a dyn Comm,
     /// Ranks that have copies of own nodes.
     neighbours: Vec<usize>,
-    /// Own nodes with several copies.
+    /// Copies of own nodes that have several of one material.
     nodes: Vec<Vec<Copy>>,
 }
 
@@ -23,11 +24,21 @@ enum Copy {
 }
 
 impl<'a> NodeSums<'a> {
-    /// For the nodes of a decomposition.
+    /// For the nodes of a decomposition. Collective.
     pub fn new(comm: &'a dyn Comm, decomposition: &Decomposition) -> Self {
         let owner = |&copy: &u32| decomposition.shares.owner(copy as usize);
-        let several = || decomposition.interface.iter().filter(|node| node.copies.len() > 1);
-        let mut neighbours: Vec<usize> = several().flat_map(|node| node.copies.iter().map(owner)).collect();
+        let mine: Vec<u64> = decomposition.subdomains.iter().map(|s| s.material as u64).collect();
+        let materials = all_gather_u64(comm, &mine);
+        let mut several = Vec::new();
+        for InterfaceNode { node, copies, .. } in &decomposition.interface {
+            let mut copies = copies.clone();
+            // Stable: copies of one material stay in the order of their subdomains.
+            copies.sort_by_key(|&copy| materials[copy as usize]);
+            let of_one = copies.chunk_by(|&a, &b| materials[a as usize] == materials[b as usize]);
+            let is_own = |copy: &u32| decomposition.own_index(*copy).is_some();
+            several.extend(of_one.filter(|c| c.len() > 1 && c.iter().any(is_own)).map(|c| (*node, c.to_vec())));
+        }
+        let mut neighbours: Vec<usize> = several.iter().flat_map(|(_, copies)| copies.iter().map(owner)).collect();
         neighbours.sort_unstable();
         neighbours.dedup();
         neighbours.retain(|&rank| rank != comm.rank());
@@ -37,11 +48,11 @@ impl<'a> NodeSums<'a> {
             }
             None => Copy::Other(neighbours.binary_search(&owner(copy)).expect("its owner is a neighbour")),
         };
-        let nodes = several().map(|node| node.copies.iter().map(|c| copy(node.node, c)).collect()).collect();
+        let nodes = several.iter().map(|(node, copies)| copies.iter().map(|c| copy(*node, c)).collect()).collect();
         Self { comm, neighbours, nodes }
     }
 
-    /// Makes all copies of a node hold the sum over them. `values` are those of each own subdomain, and `place` says where
+    /// Makes all copies of a node in one material hold the sum over them. `values` are those of each own subdomain, and `place` says where
     /// in them those of a node are, given subdomain and local node: an empty range for nodes that are not asked for. All
     /// copies of a node answer alike. One neighbour exchange.
     pub fn add(&self, place: impl Fn(usize, usize) -> Range<usize>, values: &mut [Vec<f64>]) {

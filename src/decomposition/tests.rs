@@ -202,7 +202,7 @@ fn mesh_of(bricks: &[Brick]) -> SolidMesh {
         let tets = indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell)).flatten();
         nodes.extend(tets.map(|n| first + n as u32));
     }
-    SolidMesh { points, elements: Elements::new(Kind::Tet4, nodes), cells: 0, surfaces: Vec::new() }
+    SolidMesh { points, elements: Elements::new(Kind::Tet4, nodes), cells: 0, surfaces: Vec::new(), regions: Vec::new() }
 }
 
 #[test]
@@ -211,7 +211,7 @@ fn a_body_of_several_pieces_is_cut_piece_by_piece() {
     let mesh = mesh_of(&[brick(0.0, [4, 4, 4]), brick(2.0, [1, 1, 1]), brick(4.0, [4, 4, 2])]);
     let elements = mesh.elements.len();
     let counts = Counts { nodes: mesh.points.len() as u64, cells: 0, elements: elements as u64 };
-    let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(counts))]);
+    let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(counts), vec![0])]);
     let meshes = BTreeMap::from([(0, mesh)]);
     for parts in [1, 3, 12] {
         let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[], contact: &[] };
@@ -225,7 +225,7 @@ fn a_body_of_several_pieces_is_cut_piece_by_piece() {
 #[test]
 fn contact_surfaces_stay_on_fewer_subdomains() {
     let brick = Brick { origin: [0.0; 3], size: [3.0, 1.0, 1.0], cells: [24, 8, 8] };
-    let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick))]);
+    let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick), vec![0])]);
     let surfaces = [Surface { body: 0, patch: Patch::Face(Face::ZMax) }];
     let touching = |contact: &[usize]| {
         let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &surfaces, contact };
@@ -240,7 +240,7 @@ fn contact_surfaces_stay_on_fewer_subdomains() {
 #[test]
 fn boxes_that_yield_are_spread_over_the_ranks() {
     let brick = |cells| Brick { origin: [0.0; 3], size: [1.0; 3], cells };
-    let shapes = [[8, 4, 6], [4, 4, 4]].map(|cells| (Kind::Tet4, Shape::Brick(brick(cells))));
+    let shapes = [[8, 4, 6], [4, 4, 4]].map(|cells| (Kind::Tet4, Shape::Brick(brick(cells)), vec![0]));
     let bodies = number_bodies(shapes);
     // The upper half of the first body, and a corner of the other.
     let upper: Vec<bool> = (0..24).map(|k| k >= 12).collect();

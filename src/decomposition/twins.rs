@@ -1,5 +1,5 @@
-//! Which subdomains are congruent: equal shape and connectivity within one body, so that what depends on these alone (and
-//! on the body's material) is the same.
+//! Which subdomains are congruent: equal shape, connectivity and material within one body, so that what depends on these
+//! alone is the same.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -45,12 +45,12 @@ pub fn alike(comm: &dyn Comm, subdomains: &[Subdomain], boundaries: &[Vec<u32>])
 }
 
 fn congruent(a: &Subdomain, b: &Subdomain) -> bool {
-    a.body == b.body && a.shape == b.shape && a.elements == b.elements
+    (a.body, a.material) == (b.body, b.material) && a.shape == b.shape && a.elements == b.elements
 }
 
 fn hash(subdomain: &Subdomain) -> u64 {
     let mut hasher = DefaultHasher::new();
-    subdomain.body.hash(&mut hasher);
+    (subdomain.body, subdomain.material).hash(&mut hasher);
     subdomain.elements.hash(&mut hasher);
     subdomain.shape.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
     hasher.finish()

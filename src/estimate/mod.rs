@@ -13,7 +13,7 @@
 //! ```
 //!
 //! the elastic complementary energy of the difference, for plastic states too: what the energy error bounds there (see
-//! [`crate::newton::certificate`]). Patches end where bodies do, so at contacts and where materials meet stresses may jump.
+//! [`crate::newton::certificate`]). Patches end where bodies and materials do, so stresses may jump at contacts and where materials meet.
 //! They do not end where subdomains do: the estimate depends on the mesh alone, and to the last bit not on the ranks.
 //!
 //! It is an estimate, no bound: nearly exact for smooth solutions, and blind to what the mesh does not resolve at all. Measured

@@ -59,7 +59,7 @@ mod tests {
 
     fn of_tets(tets: &[[[f64; 3]; 4]]) -> Quality {
         let elements = Elements::new(Kind::Tet4, (0..4 * tets.len() as u32).collect());
-        Quality::of(&SolidMesh { points: tets.concat(), elements, cells: 0, surfaces: Vec::new() })
+        Quality::of(&SolidMesh { points: tets.concat(), elements, cells: 0, surfaces: Vec::new(), regions: Vec::new() })
     }
 
     #[test]

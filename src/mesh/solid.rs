@@ -13,6 +13,8 @@ pub struct SolidMesh {
     pub cells: u64,
     /// Parts of the boundary; a face may be on several.
     pub surfaces: Vec<NamedSurface>,
+    /// The part of the body that each element is in; empty if there is only one.
+    pub regions: Vec<u32>,
 }
 
 /// Part of the boundary of a mesh.
@@ -25,6 +27,11 @@ pub struct NamedSurface {
 }
 
 impl SolidMesh {
+    /// The part of the body that an element is in.
+    pub fn region(&self, element: usize) -> usize {
+        self.regions.get(element).map_or(0, |&region| region as usize)
+    }
+
     /// Faces of a named surface; none if there is no such surface.
     pub fn surface(&self, name: &str) -> &[Vec<u32>] {
         self.surfaces.iter().find(|surface| surface.name == name).map_or(&[], |surface| &surface.faces)

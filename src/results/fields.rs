@@ -31,7 +31,7 @@ pub struct ContactState {
 /// Mesh of a rank's subdomains, one behind the other, with the fields that never change.
 pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
     let mut piece = Piece { offsets: vec![0], ..Piece::default() };
-    let (mut subdomain_ids, mut bodies, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut subdomain_ids, mut bodies, mut materials, mut nodes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for subdomain in subdomains {
         nodes.extend(subdomain.nodes.iter().map(|&node| node as i64));
         let first = piece.points.len() as u64;
@@ -42,11 +42,13 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
             piece.types.push(vtk_type(subdomain.elements.kind()));
             subdomain_ids.push(subdomain.id as i64);
             bodies.push(subdomain.body as i64);
+            materials.push(subdomain.material as i64);
         }
     }
     piece.point_data = vec![Field::integer("node", nodes)];
     piece.cell_data = vec![
         Field::integer("body", bodies),
+        Field::integer("material", materials),
         Field::integer("rank", vec![rank as i64; subdomain_ids.len()]),
         Field::integer("subdomain", subdomain_ids),
     ];

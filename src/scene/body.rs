@@ -1,18 +1,19 @@
-//! Bodies: a material, an element and a shape, which is a brick with axis-parallel edges, another structured body or a
-//! volume of a mesh file.
+//! Bodies: materials, an element and a shape, which is a brick with axis-parallel edges, another structured body or
+//! volumes of a mesh file.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use super::mapped::{Cylinder, Grid, Sphere};
+use super::volumes::{Materials, Volumes};
 
 /// One body of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Section", into = "Section")]
 pub struct Body {
-    /// Name of its material.
-    pub material: String,
+    /// What it is made of.
+    pub material: Materials,
     /// Finite element of its mesh.
     pub element: Element,
     /// Shape and mesh.
@@ -24,7 +25,7 @@ pub struct Body {
 pub enum Shape {
     /// A box, meshed by its number of cells.
     Brick(Brick),
-    /// A volume of a mesh file.
+    /// Volumes of a mesh file.
     Gmsh(Gmsh),
     /// An octant of a hollow sphere.
     Sphere(Sphere),
@@ -50,7 +51,7 @@ impl Body {
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Section {
-    material: String,
+    material: Materials,
     element: Element,
     brick: Option<Brick>,
     gmsh: Option<Gmsh>,
@@ -107,14 +108,14 @@ impl From<Body> for Section {
     }
 }
 
-/// A physical volume of a Gmsh file, scaled, then rotated about an axis through the origin, then moved.
+/// Physical volumes of a Gmsh file, scaled, then rotated about an axis through the origin, then moved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gmsh {
     /// The mesh file; relative paths are from the scene file.
     pub file: String,
-    /// Name of the physical volume, or its number if it has no name; may be absent if there is only one.
-    pub volume: Option<String>,
+    /// Its physical volumes; may be absent if there is only one.
+    pub volume: Option<Volumes>,
     /// Factor of all coordinates, positive.
     #[serde(default = "one")]
     pub scale: f64,

@@ -18,6 +18,7 @@ use super::material::Material;
 use super::solver::Solver;
 use super::step::Step;
 use super::surface::{Face, Support, SurfaceName};
+use super::volumes;
 
 pub(super) type Checked = Result<(), Fault>;
 
@@ -78,8 +79,7 @@ fn material(key: &str, material: &Material) -> Checked {
 }
 
 fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
-    let rule = || format!("no such material: known are {}", names(scene.material.keys()));
-    require(scene.material.contains_key(&body.material), &format!("{key}.material"), &body.material, rule())?;
+    volumes::check(&scene.material, key, body)?;
     match &body.shape {
         Shape::Brick(it) => brick(key, it),
         Shape::Gmsh(it) => gmsh(&format!("{key}.gmsh"), it),
@@ -235,7 +235,7 @@ fn step(scene: &Scene, key: &str, step: &Step) -> Checked {
 }
 
 /// What to say of a name that is not among those of a section.
-fn known<'a>(section: &str, known: impl Iterator<Item = &'a String>) -> String {
+pub(super) fn known<'a>(section: &str, known: impl Iterator<Item = &'a String>) -> String {
     match names(known) {
         none if none.is_empty() => format!("no such {section}: the scene has none"),
         known => format!("no such {section}: known are {known}"),
@@ -255,6 +255,9 @@ fn decomposition(scene: &Scene) -> Checked {
             let key = "decomposition.subdomains";
             let bodies = scene.body.len();
             require(subdomains >= bodies, key, subdomains, format!("each of the {bodies} bodies needs at least one"))?;
+            let regions = scene.body.values().map(|body| body.material.names().len()).sum();
+            let rule = format!("each material of each body needs at least one, which are {regions}");
+            require(subdomains >= regions, key, subdomains, rule)?;
             // Elements of mesh files are counted when these are read.
             let per_body: Option<Vec<usize>> =
                 scene.body.values().map(|b| Some(b.brick()?.cell_count() * b.element.per_cell())).collect();

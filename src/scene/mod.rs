@@ -23,6 +23,7 @@ mod read;
 mod solver;
 mod step;
 mod surface;
+mod volumes;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -42,6 +43,7 @@ pub use material::Material;
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
 pub use step::Step;
 pub use surface::{Face, Support, SurfaceError, SurfaceName};
+pub use volumes::{Materials, Volumes};
 
 /// A study: bodies, what holds and loads them, where they touch, how to cut and how to solve.
 ///

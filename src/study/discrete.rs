@@ -19,7 +19,7 @@ use crate::scene::{self, Scene, SurfaceName};
 pub struct Discrete {
     /// Bodies, in the order of their names.
     pub bodies: Vec<BodyMesh>,
-    /// Their materials.
+    /// Materials of the scene, in the order of their names.
     pub materials: Vec<Material>,
     /// Surfaces that the scene names.
     pub surfaces: Vec<Surface>,
@@ -65,7 +65,7 @@ pub fn discretise_expecting(
     comm: &dyn Comm,
 ) -> Result<Discrete, StudyError> {
     let Meshes { bodies, solids, warnings } = Meshes::new(scene, comm)?;
-    let materials = scene.body.values().map(|b| material(&scene.material[&b.material])).collect();
+    let materials = scene.material.values().map(material).collect();
     let number =
         |name: &str| scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies");
     let surface = |name: &SurfaceName| {
@@ -146,7 +146,7 @@ pub(super) fn cut(wanted: &scene::Decomposition, bodies: &[BodyMesh]) -> Cut {
         scene::Decomposition::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
         scene::Decomposition::Metis { subdomains: None } | scene::Decomposition::Auto => {
             let tetrahedra = bodies.iter().map(|b| b.counts().elements * b.kind.tetrahedra()).sum();
-            Cut::Metis(cost::subdomains(tetrahedra, bodies.len()))
+            Cut::Metis(cost::subdomains(tetrahedra, bodies.iter().map(|body| body.materials.len()).sum()))
         }
     }
 }

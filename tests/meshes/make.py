@@ -1,5 +1,6 @@
 """Writes the mesh files beside this script with Gmsh (pip install gmsh): a block and a square rod standing on it, not
-sharing nodes, of tetrahedra in all formats that are read, and the block of hexahedra and prisms."""
+sharing nodes, of tetrahedra in all formats that are read, the block of hexahedra and prisms, and a bar of four parts that do
+share nodes."""
 
 import pathlib
 
@@ -44,6 +45,31 @@ def name(block, rod):
     gmsh.model.addPhysicalGroup(1, [1], 1, "an edge")
 
 
+def quarters():
+    """The bar [0, 3] x [0, 1] x [0, 1] of hexahedra in four volumes, cut at x = 1 and at z = 0.25, with its outer surfaces
+    and `joint` between left and right."""
+    gmsh.clear()
+    ends, heights = [0.0, 1.0, 3.0], [0.0, 0.25, 1.0]
+    boxes = [(3, gmsh.model.occ.addBox(ends[i], 0, heights[k], ends[i + 1] - ends[i], 1, heights[k + 1] - heights[k]))
+             for i in (0, 1) for k in (0, 1)]
+    gmsh.model.occ.fragment(boxes, [])
+    gmsh.model.occ.synchronize()
+    for _, curve in gmsh.model.getEntities(1):
+        length = gmsh.model.occ.getMass(1, curve)
+        gmsh.model.mesh.setTransfiniteCurve(curve, 5 if length > 1.5 else 3)
+    for _, surface in gmsh.model.getEntities(2):
+        gmsh.model.mesh.setTransfiniteSurface(surface)
+        gmsh.model.mesh.setRecombine(2, surface)
+    for number, (name, (_, box)) in enumerate(zip(("left-low", "left-high", "right-low", "right-high"), boxes), start=1):
+        gmsh.model.mesh.setTransfiniteVolume(box)
+        gmsh.model.addPhysicalGroup(3, [box], number, name)
+    sides = {"x0": (0, 0), "x3": (0, 3), "y0": (1, 0), "y1": (1, 1), "z0": (2, 0), "z1": (2, 1), "joint": (0, 1)}
+    for number, (name, (axis, at)) in enumerate(sides.items(), start=1):
+        found = {tag for _, box in boxes for tag in faces(box, axis, at)}
+        gmsh.model.addPhysicalGroup(2, sorted(found), number, name)
+    gmsh.model.mesh.generate(3)
+
+
 def main():
     gmsh.initialize()
     gmsh.option.setNumber("General.Terminal", 0)
@@ -79,6 +105,9 @@ def main():
         abs(x - 1) < 1e-6 for x in gmsh.model.getBoundingBox(2, s)[2::3])], 2, "top")
     gmsh.model.mesh.generate(3)
     save("hexes-and-prisms", 4.1, 0)
+
+    quarters()
+    save("quarters", 4.1, 0)
     gmsh.finalize()
 
 

@@ -129,12 +129,38 @@ pub enum Problem {
         known: String,
     },
     /// A body does not say which of several volumes it is.
-    #[error("there are {count} physical volumes, so say which in gmsh.volume: {known}")]
+    #[error("there are {count} physical volumes, so say which in gmsh.volume, one or a list: {known}")]
     WhichVolume {
         /// How many.
         count: usize,
         /// What is there.
         known: String,
+    },
+    /// Cells that a body would have twice.
+    #[error(
+        "volumes `{first}` and `{second}` share {cells} cells (those of Gmsh's volume {entity}), so that they cannot be parts of one \
+         body: take that volume out of one of the two"
+    )]
+    Shared {
+        /// Name of a volume.
+        first: String,
+        /// Name of another.
+        second: String,
+        /// Tag of the volume of the geometry that both have.
+        entity: i32,
+        /// How many.
+        cells: u64,
+    },
+    /// Volumes of a body that nothing joins.
+    #[error(
+        "volume `{volume}` has no face in common with {others}: meshes of one body must meet node by node, as after \
+         `BooleanFragments` or `Coherence;`; what only touches is a body of its own, with a contact"
+    )]
+    Apart {
+        /// Name of the volume.
+        volume: String,
+        /// Names of others.
+        others: String,
     },
     /// Cells that cannot be computed with.
     #[error(

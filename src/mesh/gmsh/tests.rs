@@ -54,8 +54,8 @@ fn assert_same(found: &[SolidMesh], expected: &[SolidMesh]) {
 fn every_format_gives_the_same_bodies() {
     let of = |bytes: &[u8]| {
         let msh = parse(bytes).unwrap();
-        let block = msh.volume(Some("block"), &["base", "both sides", "top"], Kind::Tet4).unwrap();
-        (block, msh.volume(Some("the rod"), &["both sides", "9"], Kind::Tet4).unwrap())
+        let block = msh.body(&["block"], &["base", "both sides", "top"], Kind::Tet4).unwrap();
+        (block, msh.body(&["the rod"], &["both sides", "9"], Kind::Tet4).unwrap())
     };
     let (block, rod) = of(TEXT);
     assert_eq!((block.cells, rod.cells, rod.elements.len()), (90, 42, 42));
@@ -78,7 +78,7 @@ fn every_format_gives_the_same_bodies() {
 
 #[test]
 fn hexahedra_and_prisms_are_split_alike_on_both_sides_of_their_faces() {
-    let mesh = parse(HEXAHEDRA).unwrap().volume(None, &["base", "top"], Kind::Tet4).unwrap();
+    let mesh = parse(HEXAHEDRA).unwrap().body(&[], &["base", "top"], Kind::Tet4).unwrap();
     assert_eq!((mesh.cells, mesh.elements.len()), (81, 27 * 6 + 54 * 3));
     assert!((volume(&mesh) - 2.0).abs() < 1e-13);
     assert_area(area(&mesh, 0), [0.0, 0.0, -2.0], 18 + 18);
@@ -95,7 +95,7 @@ fn damaged(from: &str, to: &str) -> String {
     assert!(text.contains(from), "`{from}` is not in the file");
     let text = text.replacen(from, to, 1);
     let msh = Msh::parse(text.as_bytes(), text.len() as u64);
-    let used = msh.and_then(|msh| msh.volume(Some("block"), &["base"], Kind::Tet4));
+    let used = msh.and_then(|msh| msh.body(&["block"], &["base"], Kind::Tet4));
     let message = used.expect_err("should be refused").to_string();
     assert!(!message.contains('\n'), "one paragraph: {message}");
     message
@@ -140,7 +140,7 @@ fn missing_sections_are_named() {
     };
     assert_says(&cut("$Nodes", "$EndNodes\n").unwrap_err().to_string(), &["no section $Nodes"]);
     assert_says(&cut("$Elements", "$EndElements\n").unwrap_err().to_string(), &["no section $Elements"]);
-    let untagged = cut("$Entities", "$EndEntities\n").unwrap().volume(Some("block"), &[], Kind::Tet4);
+    let untagged = cut("$Entities", "$EndEntities\n").unwrap().body(&["block"], &[], Kind::Tet4);
     assert_says(&untagged.unwrap_err().to_string(), &["132 of 132 volume cells", "{1, 2}"]);
 }
 
@@ -168,7 +168,7 @@ fn damaged_bytes_are_refused_or_read_but_never_take_memory_or_panic() {
                 damaged[place] = (random.number().abs() * 256.0) as u8;
             }
             if let Ok(msh) = parse(&damaged) {
-                let _ = msh.volume(Some("block"), &["base", "top"], Kind::Tet4);
+                let _ = msh.body(&["block"], &["base", "top"], Kind::Tet4);
             }
         }
     }
@@ -204,7 +204,7 @@ const LOWER: &str = "4 2 2 2 1 3 2 5";
 #[track_caller]
 fn assert_refused(elements: &[&str], volume: Option<&str>, surface: &str, parts: &[&str]) {
     let msh = version_2(&NAMES, &NODES, elements).unwrap();
-    let problem = msh.volume(volume, &[surface], Kind::Tet4).expect_err("should be refused").to_string();
+    let problem = msh.body(volume.as_slice(), &[surface], Kind::Tet4).expect_err("should be refused").to_string();
     assert_says(&problem, parts);
     assert!(!problem.contains('\n'), "one paragraph: {problem}");
 }
@@ -212,8 +212,8 @@ fn assert_refused(elements: &[&str], volume: Option<&str>, surface: &str, parts:
 #[test]
 fn a_surface_between_two_volumes_belongs_to_both_with_either_sense() {
     let msh = version_2(&NAMES, &NODES, &[UPPER, LOWER, "2 2 1 7 1 2 3", "2 2 1 7 1 2 3"]).unwrap();
-    let mut up = msh.volume(Some("upper"), &["middle"], Kind::Tet4).unwrap();
-    let mut down = msh.volume(Some("lower"), &["middle"], Kind::Tet4).unwrap();
+    let mut up = msh.body(&["upper"], &["middle"], Kind::Tet4).unwrap();
+    let mut down = msh.body(&["lower"], &["middle"], Kind::Tet4).unwrap();
     assert_area(area(&up, 0), [0.0, 0.0, -0.5], 1);
     assert_area(area(&down, 0), [0.0, 0.0, 0.5], 1);
     (up.surfaces, down.surfaces) = (Vec::new(), Vec::new());
@@ -268,7 +268,7 @@ fn cells_that_cannot_be_computed_with_are_counted() {
 /// A brick of 2 x 2 x 1 cells as a file of elements of this kind, and its upper face.
 fn file_of(kind: Kind) -> (Vec<u8>, BodyMesh) {
     let brick = Brick { origin: [0.0; 3], size: [2.0, 3.0, 1.0], cells: [2, 2, 1] };
-    let body = number_bodies([(kind, Shape::Brick(brick))]).remove(0);
+    let body = number_bodies([(kind, Shape::Brick(brick), vec![0])]).remove(0);
     let lattice = body.lattice().expect("it is a brick");
     let places: Vec<_> = indices(&lattice.all_nodes()).map(|at| lattice.coordinates(at)).collect();
     let (of_volume, of_face) = if kind == Kind::Hex8 { (5, 3) } else { (11, 9) };
@@ -304,7 +304,7 @@ fn file_of(kind: Kind) -> (Vec<u8>, BodyMesh) {
 fn hexahedra_and_quadratic_tetrahedra_are_kept_for_the_elements_that_are_made_of_them() {
     for kind in [Kind::Hex8, Kind::Tet10] {
         let (text, body) = file_of(kind);
-        let mesh = parse(&text).unwrap().volume(None, &["top"], kind).unwrap();
+        let mesh = parse(&text).unwrap().body(&[], &["top"], kind).unwrap();
         assert_eq!(mesh.elements.kind(), kind);
         let expected: Vec<u32> =
             (0..body.counts().elements).flat_map(|e| body.element(e)).map(|node| node as u32).collect();
@@ -321,7 +321,7 @@ fn hexahedra_and_quadratic_tetrahedra_are_kept_for_the_elements_that_are_made_of
 #[test]
 fn other_cells_are_refused_for_them() {
     let of =
-        |text: &[u8], kind| parse(text).unwrap().volume(None, &[], kind).expect_err("should be refused").to_string();
+        |text: &[u8], kind| parse(text).unwrap().body(&[], &[], kind).expect_err("should be refused").to_string();
     let (hexahedra, quadratic) = (file_of(Kind::Hex8).0, file_of(Kind::Tet10).0);
     let assert_says = |text: String, parts: &[&str]| {
         parts.iter().for_each(|part| assert!(text.contains(part), "`{part}` is not in: {text}"));

@@ -1,4 +1,4 @@
-//! One body out of a mesh file: the elements of a physical volume, and physical surfaces on its boundary.
+//! One body out of a mesh file: the elements of physical volumes, and physical surfaces on its boundary.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,27 +11,32 @@ use crate::mesh::quality::Quality;
 use crate::mesh::{Elements, SolidMesh, split};
 
 impl Msh {
-    /// The physical volume of this name (or number, if it has no name), or the only one there is, with these surfaces, as
-    /// elements of a kind: cells are split into linear tetrahedra, and for others they must be what the kind is.
+    /// The physical volumes of these names (or numbers, if they have no name), or the only one there is, with these
+    /// surfaces, as elements of a kind: cells are split into linear tetrahedra, and for others they must be what the kind
+    /// is. Each volume is a region; elements come in the order of the file.
     ///
     /// # Errors
-    /// If the volume or one of the surfaces is missing, or elements cannot be computed with.
-    pub fn volume(&self, volume: Option<&str>, surfaces: &[&str], kind: Kind) -> Result<SolidMesh, Problem> {
+    /// If a volume or one of the surfaces is missing, volumes have no face in common or a cell, or elements cannot be
+    /// computed with.
+    pub fn body(&self, volumes: &[&str], surfaces: &[&str], kind: Kind) -> Result<SolidMesh, Problem> {
         self.refuse_untagged()?;
-        let volume = &self.choose(volume)?;
-        let blocks: Vec<&Block> = self.group(3, volume).collect();
-        refuse_others(volume, kind, &blocks)?;
+        let volumes = self.choose(volumes)?;
+        for volume in &volumes {
+            refuse_others(volume, kind, &self.group(3, volume).collect::<Vec<_>>())?;
+        }
+        let blocks = self.blocks_of(&volumes)?;
+        let volume = &volumes.join("` + `");
 
         let mut index = vec![u32::MAX; self.points.len()];
-        blocks.iter().flat_map(|b| &b.nodes).for_each(|&n| index[n as usize] = 0);
+        blocks.iter().flat_map(|(b, _)| &b.nodes).for_each(|&n| index[n as usize] = 0);
         let mut points = Vec::new();
         for (index, point) in index.iter_mut().zip(&self.points).filter(|(index, _)| **index == 0) {
             *index = points.len() as u32;
             points.push(*point);
         }
-        let mut nodes = Vec::new();
+        let (mut nodes, mut regions) = (Vec::new(), Vec::new());
         // Both sides of a face are cut alike because nodes keep their order.
-        for block in &blocks {
+        for (block, region) in &blocks {
             for cell in block.nodes.chunks_exact(block.kind.nodes) {
                 match kind {
                     Kind::Tet4 => split::tetrahedra(cell, |tet| nodes.extend(tet.map(|n| index[n as usize]))),
@@ -39,6 +44,9 @@ impl Msh {
                     Kind::Tet10 => nodes.extend([0, 1, 2, 3, 4, 5, 6, 7, 9, 8].map(|k| index[cell[k] as usize])),
                     Kind::Hex8 => nodes.extend(cell.iter().map(|&n| index[n as usize])),
                 }
+            }
+            if volumes.len() > 1 {
+                regions.resize(nodes.len() / kind.nodes(), *region as u32);
             }
         }
         let elements = Elements::new(kind, nodes);
@@ -48,13 +56,14 @@ impl Msh {
             let announced = elements.len() as u64;
             return Err(Problem::TooMany { section: "Elements", items: "elements", announced, limit });
         }
-        let cells = blocks.iter().map(|b| b.cells).sum();
-        let mut mesh = SolidMesh { points, elements, cells, surfaces: Vec::new() };
+        let cells = blocks.iter().map(|(b, _)| b.cells).sum();
+        let mut mesh = SolidMesh { points, elements, cells, surfaces: Vec::new(), regions };
         check_elements(volume, &mesh)?;
         let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
         if neighbours.overlapping > 0 {
             return Err(Problem::Overlapping { volume: volume.clone(), faces: neighbours.overlapping });
         }
+        check_joined(&volumes, &mesh, &neighbours)?;
         mesh.surfaces =
             Boundary { msh: self, volume, mesh: &mesh, neighbours: &neighbours, index: &index }.surfaces(surfaces)?;
         Ok(mesh)
@@ -83,10 +92,26 @@ impl Msh {
 
     /// Blocks of a physical group.
     pub(super) fn group(&self, dimension: i32, name: &str) -> impl Iterator<Item = &Block> {
-        let of = move |b: &&Block| {
-            b.kind.dimension == dimension && b.groups.iter().any(|&tag| self.name(dimension, tag) == name)
-        };
-        self.blocks.iter().filter(of)
+        self.blocks.iter().filter(move |block| self.is_in(block, dimension, name))
+    }
+
+    fn is_in(&self, block: &Block, dimension: i32, name: &str) -> bool {
+        block.kind.dimension == dimension && block.groups.iter().any(|&tag| self.name(dimension, tag) == name)
+    }
+
+    /// Blocks of physical volumes, each with the index of its volume.
+    fn blocks_of(&self, volumes: &[String]) -> Result<Vec<(&Block, usize)>, Problem> {
+        let mut found = Vec::new();
+        for block in &self.blocks {
+            let mut of = (0..volumes.len()).filter(|&volume| self.is_in(block, 3, &volumes[volume]));
+            let Some(first) = of.next() else { continue };
+            if let Some(second) = of.next() {
+                let [first, second] = [first, second].map(|volume| volumes[volume].clone());
+                return Err(Problem::Shared { first, second, entity: block.entity, cells: block.cells });
+            }
+            found.push((block, first));
+        }
+        Ok(found)
     }
 
     fn refuse_untagged(&self) -> Result<(), Problem> {
@@ -107,13 +132,15 @@ impl Msh {
         Err(Problem::Untagged { cells, all, entities, hint })
     }
 
-    fn choose(&self, volume: Option<&str>) -> Result<String, Problem> {
+    fn choose(&self, volumes: &[&str]) -> Result<Vec<String>, Problem> {
         let known = self.group_names(3);
-        match volume {
-            Some(name) if known.contains_key(name) => Ok(name.to_owned()),
-            Some(name) => Err(Problem::NoVolume { name: name.to_owned(), known: listed(&known, "cells") }),
-            None if known.len() == 1 => Ok(known.into_keys().next().expect("there is one")),
-            None => Err(Problem::WhichVolume { count: known.len(), known: listed(&known, "cells") }),
+        if let Some(name) = volumes.iter().find(|name| !known.contains_key(**name)) {
+            return Err(Problem::NoVolume { name: name.to_string(), known: listed(&known, "cells") });
+        }
+        match volumes {
+            [] if known.len() == 1 => Ok(known.into_keys().collect()),
+            [] => Err(Problem::WhichVolume { count: known.len(), known: listed(&known, "cells") }),
+            _ => Ok(volumes.iter().map(|name| name.to_string()).collect()),
         }
     }
 }
@@ -124,6 +151,24 @@ fn check_elements(volume: &str, mesh: &SolidMesh) -> Result<(), Problem> {
     let Some(near) = first else { return Ok(()) };
     let hint = if inverted == elements { ", or turn all cells inside out" } else { "" };
     Err(Problem::BadElements { volume: volume.to_owned(), elements, inverted, degenerate, near, hint })
+}
+
+/// Refuses volumes that nothing joins to the first.
+fn check_joined(volumes: &[String], mesh: &SolidMesh, neighbours: &Neighbours) -> Result<(), Problem> {
+    let meeting = |element: usize| {
+        neighbours.of(element).map(move |other| [mesh.region(element), mesh.region(other as usize)])
+    };
+    let pairs: BTreeSet<[usize; 2]> = (0..mesh.regions.len()).flat_map(meeting).collect();
+    let mut joined = BTreeSet::from([0]);
+    for _ in volumes {
+        let next: Vec<usize> = pairs.iter().filter(|pair| joined.contains(&pair[0])).map(|pair| pair[1]).collect();
+        joined.extend(next);
+    }
+    let apart = (0..volumes.len()).find(|volume| !joined.contains(volume));
+    apart.map_or(Ok(()), |volume| {
+        let others = joined.iter().map(|&volume| format!("`{}`", volumes[volume])).collect::<Vec<_>>().join(", ");
+        Err(Problem::Apart { volume: volumes[volume].clone(), others })
+    })
 }
 
 /// Refuses cells that the kind of element cannot be made of.

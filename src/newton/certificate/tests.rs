@@ -20,7 +20,7 @@ fn solve(scene: &Scene, ranks: usize) -> Solution {
             study::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("the bodies are held");
         let mut stresses = Vec::new();
         for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(&solved.u) {
-            let material = discrete.materials[subdomain.body];
+            let material = discrete.materials[subdomain.material];
             let samples = stress::samples(subdomain, &material, &[], u);
             stresses.extend(samples.iter().map(|sample| (sample.weight, sample.stress, material)));
         }
