@@ -68,7 +68,8 @@ impl Meshes {
                 Shape::Mesh(Counts { nodes, cells, elements })
             }
         };
-        let bodies = number_bodies(scene.body.values().map(|body| (kind(body.element), shape(body), materials(scene, body))));
+        let bodies =
+            number_bodies(scene.body.values().map(|body| (kind(body.element), shape(body), materials(scene, body))));
         Ok(Self { bodies, solids, warnings: texts[2..].to_vec() })
     }
 }

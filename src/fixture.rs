@@ -94,6 +94,31 @@ pub fn two_meshes(parts: usize) -> Scene {
     Scene::from_text(&text, "two meshes", 1, &[]).expect("the scene is sound")
 }
 
+/// A bar from x = 0 to 3 of unit cross-section, cut at x = 1 and at z = 0.25 into four volumes, with these materials (a
+/// name, or a table by volume), held against rigid motions without constraint of a uniaxial stress along x. `stiff` and
+/// `soft` contract alike under one stress.
+pub fn quarters(materials: &str, sets: &[&str]) -> Scene {
+    const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/meshes/quarters.msh");
+    let text = format!(
+        r#"
+        material.stiff = {{ young = 200.0, poisson = 0.4 }}
+        material.soft = {{ young = 50.0, poisson = 0.1 }}
+        [body.bar]
+        material = {materials}
+        element = "tet4"
+        gmsh = {{ file = "{FILE}", volume = ["left-low", "right-low", "left-high", "right-high"] }}
+        [support]
+        x = {{ surface = "bar.x0", fix = ["x"] }}
+        y = {{ surface = "bar.y0", fix = ["y"] }}
+        z = {{ surface = "bar.z0", fix = ["z"] }}
+        [decomposition]
+        method = "metis"
+        subdomains = 5
+        "#
+    );
+    Scene::from_text(&text, "quarters", 1, &owned(sets)).expect("the scene is sound")
+}
+
 /// As [`two_bricks`], with meshes that do not match: all contact rows are in one block.
 pub fn not_matching(sets: &[&str]) -> Scene {
     let cells =

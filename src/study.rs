@@ -9,6 +9,8 @@ mod meshes;
 mod report;
 mod sizes;
 mod state;
+#[cfg(test)]
+mod tests;
 
 use std::cell::{Cell, RefCell};
 use std::time::SystemTime;
@@ -21,9 +23,9 @@ use crate::cascade;
 use crate::comm::Comm;
 use crate::constraint::Kind;
 use crate::contact::ContactError;
-use crate::decomposition::{Cut, Subdomain};
 use crate::decomposition::sums::NodeSums;
 use crate::decomposition::twins::{alike, twins};
+use crate::decomposition::{Cut, Subdomain};
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
@@ -210,7 +212,11 @@ pub fn solve_from(
         coupling: RefCell::new(Coupling::new(constraints)),
         space: &space,
         sums: &sums,
-        yields: discrete.bodies.iter().flat_map(|b| &b.materials).any(|&m| discrete.materials[m].yield_stress.is_some()),
+        yields: discrete
+            .bodies
+            .iter()
+            .flat_map(|b| &b.materials)
+            .any(|&m| discrete.materials[m].yield_stress.is_some()),
     };
     timer.time("coarse set-up", || held::at_all_stages(scene, discrete, &mut coarse, &space, &modes, &stages))?;
     let solver = &scene.solver;

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""The two blocks of the benchmark as hexahedra in MSH 2.2, 200 mm wide, also with shuffled nodes and cells. Needs only Python.
+"""The two blocks of the benchmark as hexahedra in MSH 2.2, 200 mm wide, also with shuffled nodes and cells, or with a volume of
+its own in each: inside the lower one, up to the contact in the upper one. Needs only Python.
 
-    scripts/meshes/blocks.py [--shuffle SEED] --out scenes/hard/blocks.msh
+    scripts/meshes/blocks.py [--shuffle SEED] [--cores] --out scenes/hard/blocks.msh
 """
 
 import argparse
@@ -12,12 +13,14 @@ import random
 CELLS, WIDTH = (15, 5, 5), 200.0
 ORIGINS = {"lower": (0.0, 0.0, 0.0), "upper": (600.0, 0.0, 1000.0)}
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+CORES = {"lower": ((3, 12), (1, 4), (1, 4)), "upper": ((3, 12), (1, 4), (0, 3))}
 FACES = {"xmin": (0, 0), "xmax": (0, 1), "zmin": (2, 0), "zmax": (2, 1)}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shuffle", type=int, metavar="SEED")
+    parser.add_argument("--cores", action="store_true", help="name the inner cells of each block NAME-core")
     parser.add_argument("--out", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
     nodes, cells, names = [], [], []
@@ -30,7 +33,10 @@ def main():
         names.append((3, volume, body))
         boxes = list(itertools.product(*(range(n) for n in CELLS)))
         corners = lambda box, shape: [number[tuple(a + b for a, b in zip(box, corner))] for corner in shape]
-        cells += [(5, volume, corners(box, CORNERS)) for box in boxes]
+        core = lambda box: arguments.cores and all(a <= i < b for i, (a, b) in zip(box, CORES[body]))
+        if arguments.cores:
+            names.append((3, volume + 1, f"{body}-core"))
+        cells += [(5, volume + core(box), corners(box, CORNERS)) for box in boxes]
         for name, (axis, side) in FACES.items():
             tag = len(names) + 1
             names.append((2, tag, f"{body}-{name}"))

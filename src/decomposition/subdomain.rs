@@ -16,8 +16,8 @@ pub struct Facet {
     pub nodes: Vec<u32>,
 }
 
-/// A face-connected set of elements of one kind and material. Local nodes ascend in global numbering, elements likewise, so that congruent
-/// boxes of one brick are numbered alike.
+/// A face-connected set of elements of one kind and material. Local nodes ascend in global numbering, elements likewise, so
+/// that congruent boxes of one brick are numbered alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subdomain {
     /// Number among all subdomains.
@@ -129,7 +129,9 @@ impl Subdomain {
     /// As numbers, for sending; of subdomains of meshes only, whose shape follows from their points.
     pub fn pack(&self, message: &mut Vec<u64>) {
         let Self { id, body, material, nodes, points, elements, facets, boundary, .. } = self;
-        message.extend([*id, *body, *material, nodes.len(), elements.len(), facets.len(), boundary.len()].map(|n| n as u64));
+        message.extend(
+            [*id, *body, *material, nodes.len(), elements.len(), facets.len(), boundary.len()].map(|n| n as u64),
+        );
         message.extend(nodes);
         message.extend(points.as_flattened().iter().map(|x| x.to_bits()));
         pack_pairs(elements.nodes(), message);

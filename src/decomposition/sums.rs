@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::{Decomposition, InterfaceNode};
 use crate::comm::{Comm, all_gather_u64};
 
-/// Adds up what the copies of a node in subdomains of one material hold, in subdomain order: the same bits on every rank that
-/// has a copy.
+/// Adds up what the copies of a node in subdomains of one material hold, in subdomain order: the same bits on every rank
+/// that has a copy.
 pub struct NodeSums<'a> {
     comm: &'a dyn Comm,
     /// Ranks that have copies of own nodes.
@@ -52,9 +52,9 @@ impl<'a> NodeSums<'a> {
         Self { comm, neighbours, nodes }
     }
 
-    /// Makes all copies of a node in one material hold the sum over them. `values` are those of each own subdomain, and `place` says where
-    /// in them those of a node are, given subdomain and local node: an empty range for nodes that are not asked for. All
-    /// copies of a node answer alike. One neighbour exchange.
+    /// Makes all copies of a node in one material hold the sum over them. `values` are those of each own subdomain, and
+    /// `place` says where in them those of a node are, given subdomain and local node: an empty range for nodes that are not
+    /// asked for. All copies of a node answer alike. One neighbour exchange.
     pub fn add(&self, place: impl Fn(usize, usize) -> Range<usize>, values: &mut [Vec<f64>]) {
         let mut outgoing = vec![Vec::new(); self.neighbours.len()];
         let mut incoming = outgoing.clone();
@@ -105,12 +105,19 @@ impl<'a> NodeSums<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::{RANKS, built_in, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis};
+    use crate::fixture::{RANKS, built_in, on_ranks, quarters, same_on_any_ranks, two_bricks, two_bricks_by_metis};
+    use crate::scene::Scene;
 
-    /// Each node counts its elements: those of the whole mesh, whoever asks.
+    fn scenes() -> [Scene; 4] {
+        let checkered = r#"{ left-low = "stiff", left-high = "soft", right-low = "soft", right-high = "stiff" }"#;
+        let quarters = quarters(checkered, &["decomposition.subdomains=9"]);
+        [two_bricks(&[]), two_bricks_by_metis(9), built_in("patch", &[]), quarters]
+    }
+
+    /// Each node counts its elements of a material: those of the whole mesh, whoever asks.
     #[test]
     fn copies_hold_the_sum_over_all_copies() {
-        for scene in [two_bricks(&[]), two_bricks_by_metis(9), built_in("patch", &[])] {
+        for scene in scenes() {
             let count = |setup: &crate::fixture::Setup| {
                 let mut counts: Vec<Vec<f64>> =
                     setup.subdomains().iter().map(|s| vec![0.0; 2 * s.nodes.len()]).collect();
@@ -123,10 +130,10 @@ mod tests {
                 counts
             };
             let known = on_ranks(&scene, 1, |setup| {
-                let mut sums = std::collections::BTreeMap::<u64, [f64; 2]>::new();
+                let mut sums = std::collections::BTreeMap::<(u64, usize), [f64; 2]>::new();
                 for (subdomain, counts) in setup.subdomains().iter().zip(count(setup)) {
                     for (node, count) in subdomain.nodes.iter().zip(counts.as_chunks::<2>().0) {
-                        let sum = sums.entry(*node).or_default();
+                        let sum = sums.entry((*node, subdomain.material)).or_default();
                         (0..2).for_each(|k| sum[k] += count[k]);
                     }
                 }
@@ -139,7 +146,7 @@ mod tests {
                         .add(|_, node| 2 * node..2 * node + 2, &mut values);
                     for (subdomain, values) in setup.subdomains().iter().zip(values) {
                         for (node, value) in subdomain.nodes.iter().zip(values.as_chunks::<2>().0) {
-                            assert_eq!(known[0][node], *value);
+                            assert_eq!(known[0][&(*node, subdomain.material)], *value);
                         }
                     }
                 });
@@ -149,7 +156,7 @@ mod tests {
 
     #[test]
     fn sums_are_the_same_bits_on_any_ranks() {
-        for scene in [two_bricks(&[]), two_bricks_by_metis(9), built_in("patch", &[])] {
+        for scene in scenes() {
             same_on_any_ranks(&scene, |setup| {
                 let mut values = setup.displacements(3);
                 NodeSums::new(setup.comm, &setup.discrete.decomposition)

@@ -202,7 +202,13 @@ fn mesh_of(bricks: &[Brick]) -> SolidMesh {
         let tets = indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell)).flatten();
         nodes.extend(tets.map(|n| first + n as u32));
     }
-    SolidMesh { points, elements: Elements::new(Kind::Tet4, nodes), cells: 0, surfaces: Vec::new(), regions: Vec::new() }
+    SolidMesh {
+        points,
+        elements: Elements::new(Kind::Tet4, nodes),
+        cells: 0,
+        surfaces: Vec::new(),
+        regions: Vec::new(),
+    }
 }
 
 #[test]
@@ -219,6 +225,44 @@ fn a_body_of_several_pieces_is_cut_piece_by_piece() {
         assert!(subdomains.len() >= parts.max(3));
         assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
         subdomains.iter().for_each(assert_hangs_together);
+    }
+}
+
+#[test]
+fn regions_are_cut_one_by_one_by_their_size() {
+    let mut mesh = mesh_of(&[Brick { origin: [0.0; 3], size: [1.0; 3], cells: [8, 4, 4] }]);
+    // A quarter of the body between two parts of the rest.
+    let region = |nodes: &[u32]| {
+        let x = nodes.iter().map(|&n| mesh.points[n as usize][0]).sum::<f64>() / 4.0;
+        u32::from((0.25..0.5).contains(&x))
+    };
+    mesh.regions = mesh.elements.iter().map(region).collect();
+    let counts = Counts { nodes: mesh.points.len() as u64, cells: 0, elements: mesh.elements.len() as u64 };
+    let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(counts), vec![2, 5])]);
+    let meshes = BTreeMap::from([(0, mesh)]);
+    let cut = |parts: usize, ranks: usize| {
+        let subdomains = threads::run(ranks, |comm| {
+            let meshes = if comm.rank() == 0 { meshes.clone() } else { BTreeMap::new() };
+            let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[], contact: &[] };
+            tear(&torn, Cut::Metis(parts), None, comm).subdomains
+        });
+        subdomains.concat()
+    };
+    for parts in [2, 8] {
+        let subdomains = cut(parts, 1);
+        subdomains.iter().for_each(assert_hangs_together);
+        let mut elements = BTreeMap::<usize, Vec<usize>>::new();
+        for subdomain in &subdomains {
+            let x = |nodes: &[u32]| nodes.iter().map(|&n| subdomain.points[n as usize][0]).sum::<f64>() / 4.0;
+            assert!(subdomain.elements.iter().all(|e| (0.25..0.5).contains(&x(e)) == (subdomain.material == 5)));
+            elements.entry(subdomain.material).or_default().push(subdomain.elements.len());
+        }
+        let parts_of = |material| elements[&material].len();
+        assert_eq!([parts_of(2), parts_of(5)], if parts == 2 { [2, 1] } else { [6, 2] });
+        assert_eq!([2, 5].map(|material| elements[&material].iter().sum::<usize>()), [576, 192]);
+        for ranks in RANKS {
+            assert!(cut(parts, ranks) == subdomains, "{ranks} ranks");
+        }
     }
 }
 

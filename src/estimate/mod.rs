@@ -13,8 +13,8 @@
 //! ```
 //!
 //! the elastic complementary energy of the difference, for plastic states too: what the energy error bounds there (see
-//! [`crate::newton::certificate`]). Patches end where bodies and materials do, so stresses may jump at contacts and where materials meet.
-//! They do not end where subdomains do: the estimate depends on the mesh alone, and to the last bit not on the ranks.
+//! [`crate::newton::certificate`]). Patches end where bodies and materials do, so stresses may jump at contacts and
+//! where materials meet. They do not end where subdomains do: the estimate depends on the mesh alone, and to the last bit not on the ranks.
 //!
 //! It is an estimate, no bound: nearly exact for smooth solutions, and blind to what the mesh does not resolve at all. Measured
 //! over the true error (`tests`), from meshes that hardly resolve the solution to fine ones: waves 1.45 to 1.02 with linear

@@ -257,6 +257,59 @@ fn bodies_from_mesh_files_are_checked() {
 }
 
 #[test]
+fn materials_go_by_the_volumes_of_a_mesh_file() {
+    const TWO: &str = "{ core = \"copper\", shell = \"steel\" }";
+    let part = |material: &str, volume: &str, list: &[&str]| {
+        let shape = format!("gmsh = {{ file = 'part.msh'{volume} }}");
+        let text = ONE.replace("brick = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }", &shape);
+        let text = text.replace("[decomposition]\ncells = [2, 2, 2]\n", "").replace("\"steel\"", material);
+        let copper = "[material.copper]\nyoung = 1\npoisson = 0.3\n[body.block]";
+        Scene::from_text(&text.replace("[body.block]", copper), "one.toml", 1, &sets(list))
+    };
+    let both = ", volume = ['shell', 'core']";
+    let of = |scene: Scene, volume: &str| scene.body["block"].material.of(volume).map(str::to_owned);
+    for (material, volume, core) in [
+        (TWO, both, "copper"),
+        ("\"steel\"", both, "steel"),
+        ("{ core = \"copper\" }", ", volume = 'core'", "copper"),
+        ("\"steel\"", ", volume = ['core']", "steel"),
+    ] {
+        let scene = part(material, volume, &[]).unwrap();
+        assert_eq!(Scene::from_text(&scene.to_toml(), "again.toml", 1, &[]).unwrap(), scene, "{}", scene.to_toml());
+        assert_eq!(of(scene, "core").as_deref(), Some(core));
+    }
+    let changed = part(TWO, both, &["body.block.material.core=steel"]).unwrap();
+    assert_eq!(changed.body["block"].material.names().into_iter().collect::<Vec<_>>(), ["steel"]);
+    let (before, now) = (part(TWO, both, &[]).unwrap().to_toml(), changed.to_toml());
+    assert_eq!(changes(&before, &now), ["body.block.material.core was \"copper\", is \"steel\""]);
+    assert_eq!(of(part(TWO, both, &["body.block.material=steel"]).unwrap(), "core").as_deref(), Some("steel"));
+
+    let refused = |material: &str, volume: &str, list: &[&str], parts: &[&str]| {
+        assert_says(part(material, volume, list), parts);
+    };
+    let key = "body.block.material";
+    refused(TWO, "", &[], &["one.toml, line 10", key, "gmsh.volume = [\"core\", \"shell\"]"]);
+    refused("{ core = \"steel\" }", both, &[], &[key, "no material for volume `shell`"]);
+    let parts = ["line 10, column 31: body.block.material.shel = \"steel\": no such volume", "known are shell, core"];
+    refused("{ core = \"copper\", shel = \"steel\" }", both, &[], &parts);
+    refused(
+        TWO,
+        both,
+        &["body.block.material.shel=steel"],
+        &["--set body.block.material.shel=steel: ", "no such volume"],
+    );
+    let parts = ["--set body.block.material.core=wood: body.block.material.core = \"wood\"", "known are copper, steel"];
+    refused(TWO, both, &["body.block.material.core=wood"], &parts);
+    refused("\"steel\"", both, &["body.block.material.core=copper"], &["is a single string, it has no `core`"]);
+    refused("[\"steel\"]", both, &[], &["line 10", "the name of a material, or a table with one for each volume"]);
+    refused("\"steel\"", ", volume = 3", &[], &["the name of a volume, or a list of names"]);
+    refused("\"steel\"", ", volume = []", &[], &["body.block.gmsh.volume = []", "at least one"]);
+    refused("\"steel\"", ", volume = ['core', 'core']", &[], &["body.block.gmsh.volume", "once"]);
+    refuses_text("\"steel\"", TWO, &["body.block.material", "one name"]);
+    refused(TWO, both, &["decomposition.subdomains=1"], &["each material of each body", "which are 2"]);
+}
+
+#[test]
 fn names_of_bodies_and_surfaces_may_have_dots() {
     let text = ONE.replace("body.block", "body.'a.b'").replace("block.zmin", "a.b.zmin");
     let surface = |text: &str| Scene::from_text(text, "one.toml", 1, &[]).unwrap().support["base"].surface.clone();

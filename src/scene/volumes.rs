@@ -83,5 +83,7 @@ pub(super) fn check(materials: &BTreeMap<String, Material>, key: &str, body: &Bo
         exists(&key, name)?;
     }
     let without = volumes.iter().find(|volume| !of_volumes.contains_key(*volume));
-    without.map_or(Ok(()), |volume| require(false, &key, of_volumes, format!("no material for volume `{volume}`: add one")))
+    without.map_or(Ok(()), |volume| {
+        require(false, &key, of_volumes, format!("no material for volume `{volume}`: add one"))
+    })
 }

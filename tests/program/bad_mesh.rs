@@ -185,6 +185,20 @@ fn volumes_that_are_not_named_are_told_with_the_line_that_names_them() {
     mesh_refused(flat.join("\n").replace("$Elements\n112", "$Elements\n64") + "\n", &["no volume cells", "gmsh -3"]);
 }
 
+/// A body of both volumes in place of the lower one.
+#[test]
+fn volumes_that_make_no_body_and_materials_that_fit_none_are_refused() {
+    let scene = ["body.below.gmsh.volume=[\"lower\", \"upper\"]"];
+    scene_refused(&scene, &["body.below: ", "`upper` has no face in common with `lower`", "BooleanFragments"]);
+    let known = "`lower` (24 cells), `upper` (24 cells)";
+    scene_refused(&["body.below.gmsh.volume=[\"lower\", \"core\"]"], &["body.below: ", "`core`", known]);
+    let materials = |table: &str| format!("body.below.material={table}");
+    let missing = [scene[0], &materials("{ lower = \"steel\" }")];
+    scene_refused(&missing, &["body.below.material", "no material for volume `upper`"]);
+    let stranger = [scene[0], &materials("{ lower = \"steel\", uper = \"steel\" }")];
+    scene_refused(&stranger, &["body.below.material.uper", "no such volume", "lower, upper"]);
+}
+
 #[test]
 fn surfaces_that_are_not_there_are_told_from_those_that_are() {
     let parts = ["body.above: ", "`top`", "`zmax` (16 triangles", "Physical Surface(\"top\") = {1};"];

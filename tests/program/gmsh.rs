@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::Path;
 
+use crate::common::fields::Fields;
 use crate::common::msh::{Form, write};
 use crate::common::{COARSE, assert_close, assert_near, check, number, scene_file, solve, vector};
 use fetiplast::mesh::Brick;
@@ -145,6 +146,50 @@ fn meshes_of_gmsh_pass_the_patch_test() {
         assert_close("stress", number(&summary, "max_von_mises"), 0.5, 1e-9);
         assert_near("reaction", vector(&summary["reactions"]["base"]), [0.0, 0.0, -1.0], 1e-10);
     }
+}
+
+/// A bar of four volumes under tension, checkered; started once more from its own state, cut otherwise.
+#[test]
+fn volumes_of_a_body_have_materials_of_their_own() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/meshes/quarters.msh");
+    let text = format!(
+        r#"
+        material.a = {{ young = 200.0, poisson = 0.3 }}
+        material.b = {{ young = 1.0, poisson = 0.3 }}
+        material.c = {{ young = 50.0, poisson = 0.3, yield_stress = 0.2, hardening = 5.0 }}
+        [body.bar]
+        material = {{ left-low = "a", right-low = "c", left-high = "c", right-high = "a" }}
+        element = "tet4"
+        gmsh = {{ file = {path:?}, volume = ["left-low", "left-high", "right-low", "right-high"] }}
+        [support.fixed]
+        surface = "bar.x0"
+        fix = ["x", "y", "z"]
+        [load.pull]
+        surface = "bar.x3"
+        traction = [0.3, 0.0, 0.0]
+        "#
+    );
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), &text);
+    let run = solve(2, &scene, &TIGHT).converged();
+    let summary = run.summary();
+    assert_eq!(summary["subdomains"], 4);
+    assert_eq!(summary["warnings"].as_array().map(Vec::len), Some(0), "{}", summary["warnings"]);
+    assert_eq!(check(1, &scene, 1, &[]).summary()["subdomains"], 4);
+    let fields = Fields::read(&run.result());
+    let (materials, kappa) = (fields.integers_of_elements("material"), fields.of_elements("equivalent_plastic_strain"));
+    assert!(kappa.iter().any(|&k| k > 0.0));
+    for ((nodes, material), kappa) in fields.elements.iter().zip(materials).zip(kappa) {
+        let [x, _, z] = std::array::from_fn(|a| nodes.iter().map(|&n| fields.points[n][a]).sum::<f64>() / 4.0);
+        let expected = if (x < 1.0) == (z < 0.25) { 0 } else { 2 };
+        assert!(material == expected && (kappa == 0.0 || material == 2), "{material} at {x}, {z}");
+    }
+
+    let state = format!("initial.result={:?}", run.result());
+    let again = solve(1, &scene, &[&TIGHT[..], &[&state, "decomposition.subdomains=9"]].concat()).converged().summary();
+    assert!(number(&again, "subdomains") >= 9.0);
+    assert_close("displacement", number(&again, "max_displacement"), number(&summary, "max_displacement"), 1e-7);
+    assert_eq!(again["plastic_elements"], 0, "the load is borne by what has hardened under it");
 }
 
 #[test]

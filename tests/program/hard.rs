@@ -108,6 +108,21 @@ fn a_million_times_stiffer_body_converges_with_scaling() {
     }
 }
 
+/// A core in each body, one of them up to the contact: stiffness jumps between subdomains that are glued.
+#[test]
+fn a_million_times_stiffer_core_converges_as_fast() {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hard/cores.toml");
+    let solved = |sets: &[&str], load: f64| {
+        let summary = assert_solved(solve(RANKS, scene, sets));
+        assert_balance(&summary, load);
+        number(&summary, "hessian_multiplications")
+    };
+    let load = "load.top.traction.2=-30";
+    let plain = solved(&[load], 9e7);
+    let count = solved(&[load, "material.core.young=2.1e11"], 9e7);
+    assert!(count <= 3.0 * plain, "{count} applications of F, {plain} without a jump");
+}
+
 #[test]
 fn the_decomposition_changes_nothing_where_the_contact_edge_meets_subdomain_corners() {
     let tight = ["solver.newton_tolerance=1e-7", "solver.residual_tolerance=1e-8", "solver.qp_tolerance=1e-9"];

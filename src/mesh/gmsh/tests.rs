@@ -221,6 +221,35 @@ fn a_surface_between_two_volumes_belongs_to_both_with_either_sense() {
 }
 
 #[test]
+fn several_volumes_are_the_regions_of_one_body() {
+    let msh = version_2(&NAMES, &NODES, &[LOWER, UPPER, "2 2 2 8 1 2 4", "2 2 1 7 1 2 3"]).unwrap();
+    let body = |volumes: &[&str], surface: &str| msh.body(volumes, &[surface], Kind::Tet4);
+    let mesh = body(&["upper", "lower"], "side").unwrap();
+    assert_eq!((mesh.points.len(), mesh.elements.len(), &mesh.regions[..]), (5, 2, &[1, 0][..]));
+    assert_eq!(body(&["lower", "upper"], "side").unwrap().regions, [0, 1]);
+    let alone = body(&["upper"], "side").unwrap();
+    assert!(alone.regions.is_empty() && alone.region(0) == 0);
+    // What is a boundary of each volume is none of both.
+    let inner = body(&["upper", "lower"], "middle").unwrap_err().to_string();
+    assert_says(&inner, &["1 of 1 triangles", "`middle`", "inside volume `upper` + `lower`"]);
+    let none = body(&["upper", "core"], "side").unwrap_err().to_string();
+    assert_says(&none, &["no physical volume `core`", "`lower` (1 cells), `upper` (1 cells)"]);
+}
+
+#[test]
+fn volumes_that_make_no_body_are_refused() {
+    // An edge in common is no face.
+    let msh = version_2(&NAMES, &NODES, &[UPPER, "4 2 2 2 1 5 3 6"]).unwrap();
+    let apart = msh.body(&["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
+    assert_says(&apart, &["`lower` has no face in common with `upper`", "BooleanFragments", "a contact"]);
+    let mut msh = version_2(&NAMES, &NODES, &[UPPER, LOWER]).unwrap();
+    msh.blocks[1].groups.push(1);
+    let shared = msh.body(&["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
+    assert_says(&shared, &["`upper` and `lower` share 1 cells", "Gmsh's volume 2", "take that volume out"]);
+    assert_eq!(msh.body(&["upper"], &[], Kind::Tet4).unwrap().elements.len(), 2);
+}
+
+#[test]
 fn volumes_that_cannot_be_found_are_told_from_those_there_are() {
     let sides = [UPPER, LOWER, "2 2 2 8 1 2 4"];
     let known = "`lower` (1 cells), `upper` (1 cells)";
@@ -320,8 +349,7 @@ fn hexahedra_and_quadratic_tetrahedra_are_kept_for_the_elements_that_are_made_of
 
 #[test]
 fn other_cells_are_refused_for_them() {
-    let of =
-        |text: &[u8], kind| parse(text).unwrap().body(&[], &[], kind).expect_err("should be refused").to_string();
+    let of = |text: &[u8], kind| parse(text).unwrap().body(&[], &[], kind).expect_err("should be refused").to_string();
     let (hexahedra, quadratic) = (file_of(Kind::Hex8).0, file_of(Kind::Tet10).0);
     let assert_says = |text: String, parts: &[&str]| {
         parts.iter().for_each(|part| assert!(text.contains(part), "`{part}` is not in: {text}"));

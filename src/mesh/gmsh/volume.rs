@@ -155,9 +155,8 @@ fn check_elements(volume: &str, mesh: &SolidMesh) -> Result<(), Problem> {
 
 /// Refuses volumes that nothing joins to the first.
 fn check_joined(volumes: &[String], mesh: &SolidMesh, neighbours: &Neighbours) -> Result<(), Problem> {
-    let meeting = |element: usize| {
-        neighbours.of(element).map(move |other| [mesh.region(element), mesh.region(other as usize)])
-    };
+    let meeting =
+        |element: usize| neighbours.of(element).map(move |other| [mesh.region(element), mesh.region(other as usize)]);
     let pairs: BTreeSet<[usize; 2]> = (0..mesh.regions.len()).flat_map(meeting).collect();
     let mut joined = BTreeSet::from([0]);
     for _ in volumes {
