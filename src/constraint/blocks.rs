@@ -16,7 +16,8 @@ struct Cluster {
 }
 
 impl Constraints {
-    /// All rows that touch this rank's subdomains. `pairs` are the contact pairs of the whole scene. Collective.
+    /// All rows that touch this rank's subdomains. `pairs` are the contact pairs of the whole scene, `stiffness` that of all
+    /// subdomains (Young's modulus). Collective.
     ///
     /// # Errors
     /// If supports contradict each other: the same error on every rank.
@@ -25,6 +26,7 @@ impl Constraints {
         decomposition: &Decomposition,
         supports: &[Support],
         pairs: &[ContactPair],
+        stiffness: &[f64],
     ) -> Result<Self, ConstraintError> {
         dirichlet::check(comm, &decomposition.interface, supports)?;
         let contact_nodes = gather_nodes(comm, decomposition, pairs);
@@ -51,7 +53,7 @@ impl Constraints {
             let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
             for interface in cluster.nodes.iter().filter_map(|&number| node(number)) {
                 let fixed = dirichlet::fixed(interface, supports);
-                rows.extend(gluing::rows(interface));
+                rows.extend(gluing::rows(interface, stiffness));
                 rows.extend(dirichlet::rows(interface, &fixed));
                 sides.insert(interface.node, (interface, fixed));
             }
@@ -64,6 +66,7 @@ impl Constraints {
                 }
             }
             rows.extend(contacts.into_values().flatten());
+            rows.iter_mut().for_each(|row| row.weigh(stiffness));
             let subdomains: BTreeSet<u32> = sides.values().flat_map(|(n, _)| n.copies.iter().copied()).collect();
             result.push_block(rows, subdomains.into_iter().collect(), decomposition);
         }

@@ -54,7 +54,7 @@ pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> 
     }
     let scale = 1.0 / square.sqrt();
     terms.iter_mut().for_each(|term| term.value *= scale);
-    Ok(Row { kind: Kind::Contact { pair: number }, rhs: scale * rhs, scale, terms, held })
+    Ok(Row { kind: Kind::Contact { pair: number }, rhs: scale * rhs, scale, length: 1.0, terms, held })
 }
 
 /// Adds a row to those of the same slave node, unless one of them implies it; takes its place where it implies that one.

@@ -65,6 +65,7 @@ pub(super) fn rows(node: &InterfaceNode, fixed: &[Option<(usize, f64)>; 3]) -> V
         kind: Kind::Support { support, axis },
         rhs: root * value,
         scale: 1.0 / root,
+        length: 1.0,
         terms: node
             .copies
             .iter()

@@ -1,5 +1,10 @@
-//! The rows of B: gluing of copies, supports and contact, unit vectors. All are orthogonal but for contact rows that share
-//! nodes, where a node is in several contacts or meshes do not match.
+//! The rows of B: gluing of copies, supports and contact. All are orthogonal but for contact rows that share nodes, where a
+//! node is in several contacts or meshes do not match.
+//!
+//! Rows are unit vectors unless stiffness jumps. Where it does a row is as long as the root of the stiffness it works against,
+//! relative to the largest: the orthogonal projector onto multipliers in balance then is the one with a diagonal `Q` of Klawonn
+//! and Widlund (Comm. Pure Appl. Math. 54, 2001), without which iterations grow with the jump. Copies of a node are glued the
+//! stiff ones first, so that stiff ones are not glued by way of a soft one.
 //!
 //! Rows that share a node form a *block*: the gluing and support rows of a node, together with those of the nodes
 //! that contact ties to it. A rank holds every row of every block that one of its subdomains touches, so whatever
@@ -57,8 +62,10 @@ pub struct Row {
     pub kind: Kind,
     /// Right-hand side (length, times `scale`).
     pub rhs: f64,
-    /// Factor that made the row a unit vector: physical nodal force = `scale` times multiplier.
+    /// Factor that made the row as long as it is: physical nodal force = `scale` times multiplier.
     pub scale: f64,
+    /// Length of the row.
+    pub length: f64,
     /// Its coefficients.
     pub terms: Vec<Term>,
     /// Components of a contact's condition that supports fix, which are part of the right-hand side.
@@ -83,7 +90,24 @@ impl Term {
     }
 }
 
+/// Jumps of stiffness below this change nothing.
+const JUMP: f64 = 16.0;
+
 impl Row {
+    /// Makes a unit vector as long as the root of the stiffness it works against, relative to the largest and up to a power of
+    /// two, given that of all subdomains.
+    fn weigh(&mut self, stiffness: &[f64]) {
+        let largest = stiffness.iter().copied().fold(0.0, f64::max);
+        let flexibility: f64 = self.terms.iter().map(|t| t.value * t.value / stiffness[t.subdomain as usize]).sum();
+        let relative = 1.0 / (flexibility * largest);
+        if relative * JUMP <= 1.0 {
+            self.length = (0.5 * relative.log2()).round().exp2();
+            self.rhs *= self.length;
+            self.scale *= self.length;
+            self.terms.iter_mut().for_each(|term| term.value *= self.length);
+        }
+    }
+
     /// Whether the multiplier is bounded below by zero.
     pub fn is_inequality(&self) -> bool {
         matches!(self.kind, Kind::Contact { .. })

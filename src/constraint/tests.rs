@@ -5,7 +5,7 @@ use super::{ConstraintError, Constraints, Kind, Row, Support};
 use crate::contact::ContactPair;
 use crate::decomposition::{InterfaceNode, Subdomain};
 use crate::fixture::{
-    RANKS, Setup, assert_close, built_in, column, not_matching, on_ranks, two_bricks, two_bricks_by_metis,
+    RANKS, Setup, assert_close, built_in, column, not_matching, on_ranks, quarters, two_bricks, two_bricks_by_metis,
 };
 use crate::scene::Scene;
 
@@ -31,6 +31,30 @@ fn rows_are_orthonormal() {
         setup.discrete.decomposition.interface.iter().map(|n| n.copies.len()).max()
     });
     assert_eq!(most, [Some(8)]);
+}
+
+#[test]
+fn rows_are_as_long_as_the_root_of_the_stiffness_they_work_against() {
+    let materials = r#"{ left-low = "stiff", left-high = "soft", right-low = "soft", right-high = "stiff" }"#;
+    // A jump of 2^20.
+    let jump = format!("material.soft.young={:?}", 200.0 / f64::from(1 << 20));
+    let scene = quarters(materials, &[&jump, "decomposition.subdomains=12"]);
+    on_ranks(&scene, 1, |setup| {
+        let b = setup.dense_rows();
+        let lengths: Vec<f64> = setup.rows().iter().map(|row| row.length).collect();
+        let squares = Mat::from_fn(b.nrows(), b.nrows(), |i, j| if i == j { lengths[i] * lengths[i] } else { 0.0 });
+        assert_close(&(&b * b.transpose()), &squares, 1e-14);
+        let soft: Vec<bool> = setup.subdomains().iter().map(|s| s.material == 0).collect();
+        let mut found = [0; 2];
+        for row in setup.rows() {
+            let soft: Vec<bool> = row.terms.iter().map(|term| soft[term.subdomain as usize]).collect();
+            // What joins a soft copy to others gives way as it does.
+            let (easy, power) = (soft.contains(&true), row.length.log2());
+            assert!(if easy { (-10.0..=-8.0).contains(&power) } else { power == 0.0 }, "{row:?}");
+            found[usize::from(easy)] += 1;
+        }
+        assert!(found.iter().all(|&count| count > 10), "{found:?}");
+    });
 }
 
 #[test]
@@ -121,7 +145,7 @@ fn supports_in_conflict_are_refused_on_every_rank_with_one_message() {
             let [name, value] = ["other", "right"].map(String::from);
             let twin = supports.iter().find(|s| s.name == value).expect("the scene has it");
             supports.push(Support { name, displacement: [0.0, 0.1, 0.5], ..twin.clone() });
-            Constraints::new(setup.comm, &setup.discrete.decomposition, &supports, &[]).err()
+            Constraints::new(setup.comm, &setup.discrete.decomposition, &supports, &[], &[1.0; 100]).err()
         });
         let expected = ConstraintError::Conflict {
             first: "right".into(),

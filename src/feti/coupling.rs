@@ -1,10 +1,15 @@
-//! Rows that are not orthogonal to each other: contact rows that share nodes. All other rows are orthonormal.
+//! `B B'`: the squares of the rows' lengths, but for rows that are not orthogonal to each other, contact rows that share nodes.
 
 use super::gram::Gram;
 use crate::constraint::Constraints;
 
-/// `B B'` of the contact rows of each block where it is not the identity.
-pub struct Coupling(Vec<Gram>);
+/// `B B'` of the rows of this rank.
+pub struct Coupling {
+    /// Squared length of each row.
+    squares: Vec<f64>,
+    /// The contact rows of each block where it is not diagonal.
+    grams: Vec<Gram>,
+}
 
 /// Share of the deepest overlap that is round-off.
 const ROUNDING: f64 = 1e-12;
@@ -16,24 +21,29 @@ impl Coupling {
             rows.clone().filter(|&row| constraints.rows[row].is_inequality()).collect()
         };
         let several = constraints.blocks.iter().map(contacts).filter(|rows| rows.len() > 1);
-        Self(several.map(|rows| Gram::new(constraints, rows)).filter(Gram::is_coupled).collect())
+        Self {
+            squares: constraints.rows.iter().map(|row| row.length * row.length).collect(),
+            grams: several.map(|rows| Gram::new(constraints, rows)).filter(Gram::is_coupled).collect(),
+        }
     }
 
     /// `rows = (B B')^-1 rows` with the kept rows of `B`; the others get zero where rows are coupled. Local.
     pub fn solve(&mut self, rows: &mut [f64], kept: impl Fn(usize) -> bool) {
-        for gram in &mut self.0 {
+        let x = rows.to_vec();
+        rows.iter_mut().zip(&self.squares).for_each(|(row, square)| *row /= square);
+        for gram in &mut self.grams {
             gram.factorise(|_, _| 1.0, &kept);
-            let x = rows.to_vec();
             gram.solve(&x, rows);
         }
     }
 
-    /// From the slack `c - B u` of all rows to multipliers `x` such that `u + B'x` satisfies the coupled rows. Others of `x`
-    /// stay as they are. Local.
+    /// From the slack `c - B u` of all rows, and the part `x` of it that is to be closed, to multipliers `x` such that `u + B'x`
+    /// does so. Local.
     ///
-    /// Rows that are violated are closed; where that violates others these are closed too.
+    /// Coupled rows that are violated are closed; where that violates others these are closed too.
     pub fn close(&mut self, slack: &[f64], x: &mut [f64]) {
-        for gram in &mut self.0 {
+        x.iter_mut().zip(&self.squares).for_each(|(x, square)| *x /= square);
+        for gram in &mut self.grams {
             let rows = gram.rows().to_vec();
             let deepest = rows.iter().fold(0.0_f64, |deepest, &row| deepest.max(-slack[row]));
             let mut closed: Vec<bool> = rows.iter().map(|&row| slack[row] < 0.0).collect();
@@ -64,8 +74,8 @@ mod tests {
     use crate::fixture::{Setup, not_matching, on_ranks, same_on_any_ranks, two_bricks};
 
     #[test]
-    fn orthonormal_rows_are_not_coupled() {
-        on_ranks(&two_bricks(&[]), 2, |setup| assert!(Coupling::new(&setup.discrete.constraints).0.is_empty()));
+    fn orthogonal_rows_are_not_coupled() {
+        on_ranks(&two_bricks(&[]), 2, |setup| assert!(Coupling::new(&setup.discrete.constraints).grams.is_empty()));
     }
 
     #[test]
@@ -79,7 +89,7 @@ mod tests {
             let (mut torn, mut taken) = (setup.gather.zeros(), slack.clone());
             setup.gather.add_transpose(1.0, &x, &mut torn);
             setup.gather.apply(&torn, &mut taken);
-            let coupled: Vec<usize> = coupling.0.iter().flat_map(|gram| gram.rows().to_vec()).collect();
+            let coupled: Vec<usize> = coupling.grams.iter().flat_map(|gram| gram.rows().to_vec()).collect();
             if setup.comm.size() == 1 {
                 assert!(coupled.iter().any(|&row| slack[row] >= 0.0 && x[row] != 0.0), "some rows join");
                 assert!(coupled.iter().any(|&row| slack[row] >= 0.0 && x[row] == 0.0), "some stay open");

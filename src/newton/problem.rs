@@ -149,7 +149,7 @@ impl TornProblem<'_> {
         slack
     }
 
-    /// Corrects a displacement by `B'` until it is admissible. Where rows are orthonormal that is the projection.
+    /// Corrects a displacement by `B'` until it is admissible. Where rows are orthogonal that is the projection.
     pub fn make_admissible(&self, u: &mut Torn) {
         let slack = self.slack(u);
         let mut correction = self.violated(slack.clone());

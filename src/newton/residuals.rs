@@ -71,7 +71,7 @@ impl TornProblem<'_> {
             let found = if row.is_inequality() {
                 [0.0, (-gap).max(0.0), (gap * force).abs(), force.abs(), 0.0]
             } else {
-                [s.abs(), 0.0, 0.0, 0.0, 0.0]
+                [s.abs() / row.length, 0.0, 0.0, 0.0, 0.0]
             };
             for (w, f) in worst.iter_mut().zip(found) {
                 *w = if f.is_nan() { f } else { w.max(f) };
@@ -133,9 +133,7 @@ impl TornProblem<'_> {
         let mut rows = vec![0.0; self.gather.rows()];
         self.gather.apply(v, &mut rows);
         for (value, row) in rows.iter_mut().zip(&self.constraints.rows) {
-            if !kinds(row.kind) {
-                *value = 0.0;
-            }
+            *value = if kinds(row.kind) { *value / (row.length * row.length) } else { 0.0 };
         }
         self.gather.add_transpose(-1.0, &rows, v);
     }

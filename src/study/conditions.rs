@@ -29,6 +29,8 @@ pub(super) struct Given<'a> {
     /// Names of the contacts.
     pub contacts: &'a [String],
     pub pairs: &'a [ContactPair],
+    /// Young's modulus of each subdomain, of all ranks.
+    pub stiffness: &'a [f64],
 }
 
 /// The rows of B, and their right-hand sides over the history, which are all that changes. Collective.
@@ -38,7 +40,7 @@ pub(super) struct Given<'a> {
 pub(super) fn constraints(
     scene: &Scene,
     comm: &dyn Comm,
-    &Given { decomposition, supports, contacts, pairs }: &Given,
+    &Given { decomposition, supports, contacts, pairs, stiffness }: &Given,
 ) -> Result<(Constraints, RightHandSides), StudyError> {
     // At rest without a step.
     let rows = |step: Option<&Step>| {
@@ -46,7 +48,7 @@ pub(super) fn constraints(
         let scaled = |s: &Support| Support { displacement: s.displacement.map(|d| factor(s) * d), ..s.clone() };
         let supports: Vec<Support> = supports.iter().map(scaled).collect();
         let pairs: Vec<ContactPair> = pairs.iter().map(|pair| moved(scene, pair, step)).collect();
-        let rows: Result<_, ConstraintError> = Constraints::new(comm, decomposition, &supports, &pairs);
+        let rows: Result<_, ConstraintError> = Constraints::new(comm, decomposition, &supports, &pairs, stiffness);
         let rows = agree(comm, "supports", rows).map_err(StudyError::Supports)?;
         refuse_held(comm, contacts, &pairs, &rows)?;
         Ok::<_, StudyError>(rows)

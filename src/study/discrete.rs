@@ -65,7 +65,7 @@ pub fn discretise_expecting(
     comm: &dyn Comm,
 ) -> Result<Discrete, StudyError> {
     let Meshes { bodies, solids, warnings } = Meshes::new(scene, comm)?;
-    let materials = scene.material.values().map(material).collect();
+    let materials: Vec<Material> = scene.material.values().map(material).collect();
     let number =
         |name: &str| scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies");
     let surface = |name: &SurfaceName| {
@@ -105,8 +105,15 @@ pub fn discretise_expecting(
     };
     let loads = scene.load.values().map(load).collect();
     let contacts: Vec<String> = scene.contact.keys().cloned().collect();
-    let given =
-        conditions::Given { decomposition: &decomposition, supports: &supports, contacts: &contacts, pairs: &pairs };
+    let young: Vec<f64> = decomposition.subdomains.iter().map(|s| materials[s.material].young).collect();
+    let stiffness = comm.all_gather(&young, &decomposition.shares.counts(1));
+    let given = conditions::Given {
+        decomposition: &decomposition,
+        supports: &supports,
+        contacts: &contacts,
+        pairs: &pairs,
+        stiffness: &stiffness,
+    };
     let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given)?;
     Ok(Discrete {
         bodies,

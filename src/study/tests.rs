@@ -151,6 +151,23 @@ fn subdomains_change_no_energy_and_ranks_no_bit() {
     }
 }
 
+/// Materials that differ a million times take about as many applications of F as one material does.
+#[test]
+fn jumps_of_stiffness_inside_a_body_cost_few_iterations() {
+    let count = |materials: &str, more: &[&str]| {
+        let sets = [&[BENT, "decomposition.subdomains=12"], more].concat();
+        let summary = solve(&quarters(materials, &sets), 1).summary;
+        summary.counters.hessian_multiplications.unwrap()
+    };
+    for materials in [SERIES, PARALLEL, CHECKERED] {
+        let alike = count(materials, &["material.soft.young=200", "material.soft.poisson=0.4"]);
+        for young in ["2e-4", "2e8"] {
+            let jump = count(materials, &[&format!("material.soft.young={young}")]);
+            assert!(jump <= 3 * alike, "{materials}: {jump} applications of F at {young}, {alike} without a jump");
+        }
+    }
+}
+
 #[test]
 fn one_material_named_for_each_volume_is_one_material() {
     const EACH: &str = r#"{ left-low = "soft", left-high = "soft", right-low = "soft", right-high = "soft" }"#;
