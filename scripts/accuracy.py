@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
-"""Errors of contact between curved surfaces against closed forms, on refined meshes.
+"""Errors of contact between curved surfaces against closed forms and another program, on refined meshes.
 
     scripts/accuracy.py run [STUDY ...] [--np 2]    makes meshes, solves, appends to bench-results/accuracy.jsonl
     scripts/accuracy.py write [--check]             makes bench-results/accuracy.md of it, or only says whether it is up to date
 
-Studies are ring, patch and hertz; all of them take five minutes.
+Studies are ring, spheres, patch, hertz and step-42; all of them take ten minutes.
 
-Needs the packages of scripts/requirements.txt and a release build.
+Needs the packages of scripts/requirements.txt.
 """
 
+import itertools
 import json
+import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -34,7 +37,8 @@ class Fields:
             points, entries = (grid[f"NumberOf{name}"][:] for name in ("Points", "ConnectivityIds"))
             self.points = grid["Points"][:]
             connectivity = grid["Connectivity"][:] + np.repeat(np.cumsum(points) - points, entries)
-            self.tets = connectivity.reshape(-1, 4)
+            self.cells = connectivity.reshape(grid["NumberOfCells"][:].sum(), -1)
+            self.tets = self.cells[:, :4]
             self.of_points = {name: data[-len(self.points) :] for name, data in grid["PointData"].items()}
             self.of_cells = {name: data[-len(self.tets) :] for name, data in grid["CellData"].items()}
 
@@ -47,7 +51,7 @@ class Fields:
 
     def body_of_points(self):
         body = np.zeros(len(self.points), dtype=int)
-        body[self.tets] = self.of_cells["body"][:, None]
+        body[self.cells] = self.of_cells["body"][:, None]
         return body
 
 
@@ -59,14 +63,18 @@ def bisect(low, high, above):
     return 0.5 * (low + high)
 
 
-def solve(scene, sets, ranks, directory):
-    """Summary and fields of a run."""
-    command = ["mpirun", "-np", str(ranks), str(ROOT / "target/release/fetiplast"), "solve", str(scene)]
-    command += ["--out", str(directory), "--progress", "off"]
+def run_of(scene, sets, ranks, directory):
+    """Solves a scene and returns its summary."""
+    command = [ROOT / "scripts/run", "solve", scene, "--out", directory, "--progress", "off"]
     for key in sets:
         command += ["--set", key]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return json.loads((directory / f"{scene.stem}.json").read_text()), Fields(directory / f"{scene.stem}.vtkhdf")
+    subprocess.run(command, env=os.environ | {"NP": str(ranks)}, check=True, stdout=subprocess.DEVNULL)
+    return json.loads((directory / f"{scene.stem}.json").read_text())
+
+
+def solve(scene, sets, ranks, directory):
+    """Summary and fields of a run."""
+    return run_of(scene, sets, ranks, directory), Fields(directory / f"{scene.stem}.vtkhdf")
 
 
 def mesh(name, arguments, out):
@@ -152,6 +160,22 @@ def ring(ranks):
             yield {"family": family, "h": width, "mesh": f"{inner}/{outer}"}, summary, ring_errors(summary, fields)
 
 
+def spheres(ranks):
+    """The nested spheres of structured meshes, whose nodes are on the spheres, of quadratic tetrahedra."""
+    families = {"matching": [(2, 2), (4, 4), (8, 8)], "3 : 2": [(3, 2), (6, 4), (9, 6)], "2 : 3": [(2, 3), (4, 6), (6, 9)]}
+    for family, sizes in families.items():
+        for inner, outer in sizes:
+            sets = [f"body.inner.sphere.cells=[{inner}, {inner}]", f"body.outer.sphere.cells=[{outer}, {outer}]"]
+            sets += [f"body.{body}.element=tet10" for body in ("inner", "outer")]
+            with tempfile.TemporaryDirectory() as directory:
+                scene = ROOT / "scenes/precision/nested-spheres.toml"
+                summary, fields = solve(scene, sets, ranks, pathlib.Path(directory))
+            width = 0.25 * np.pi * B / inner
+            errors = ring_errors(summary, fields)
+            del errors["plastic front"]  # by whole elements, too large to tell it
+            yield {"family": family, "h": width, "mesh": f"{inner}/{outer}"}, summary, errors
+
+
 def patch(ranks):
     """Pressure in and around two elastic spheres: each is under that pressure alone, and displacements are linear."""
     sets = ["material.paper.yield_stress=1e9", "contact.joint.clearance=0", "load.bore.pressure=100"]
@@ -231,7 +255,70 @@ def hertz(ranks):
         yield {"family": "hertz", "h": h, "mesh": f"a/{1 / h:.0f}"}, summary, hertz_errors(summary, fields)
 
 
-STUDIES = {"ring": ring, "patch": patch, "hertz": hertz}
+def forces_of_deal_ii():
+    """On the whole ball in deal.II's adaptive cycles: of linear and of quadratic elements."""
+    cycles = json.loads((ROOT / "bench-results/raw/deal.II-step-42.json").read_text())["cycles"]
+    return [cycle["contact_force"] for cycle in cycles]
+
+
+def limit_of_deal_ii():
+    """Where those of linear elements go, by Aitken's rule from the last three."""
+    a, b, c = forces_of_deal_ii()[0][-3:]
+    return c - (c - b) ** 2 / ((c - b) - (b - a))
+
+
+SPHERE, TOP, TOUCHED = 0.6, 1.59, 0.15
+"""Radius of the ball and height of its centre over the bottom of the unit cube; what the contact surely stays within."""
+
+
+def graded(width, length):
+    """Planes from 0 to `length`: `width` apart where the ball touches, then ever wider."""
+    planes, step = [0.0], width
+    while planes[-1] + step < length:
+        planes.append(planes[-1] + step)
+        if planes[-1] >= TOUCHED:
+            step *= 1.25
+    if length - planes[-1] < 0.5 * step:
+        planes.pop()
+    return [*planes, length]
+
+
+def upright(width):
+    """The ball as a height field of level treads around the nodes: contact holds along z, as in deal.II, and not along the
+    ball's normals."""
+    treads = np.arange(int(TOUCHED / width) + 1) * width
+    rim = np.repeat(treads, 2)
+    heights = TOP - np.sqrt(SPHERE**2 - rim[:, None] ** 2 - rim[None, :] ** 2)
+    rows = ", ".join(f"[{', '.join(map(repr, map(float, row)))}]" for row in heights)
+    corner, spacing = [0.5 - width / 4] * 2, [width / 2] * 2
+    return f"heightfield = {{ origin = {corner}, spacing = {spacing}, heights = [{rows}], above = true }}"
+
+
+def ball(ranks):
+    """The force that holds deal.II's rigid ball in the cube of step-42, on meshes graded towards the contact."""
+    scene = (ROOT / "src/scene/library/step-42.toml").read_text().partition("[decomposition]")[0]
+    limit = limit_of_deal_ii()
+    # Quadratic elements have nodes in the middle of their edges, too.
+    meshes = [("tet4", (32, 64), 1), ("hex8", (16, 32, 64), 1), ("tet10", (8, 16, 32), 2)]
+    for (element, cells, degree), held in itertools.product(meshes, ("along normals", "along z")):
+        for per_edge in cells:
+            side, height = graded(1 / per_edge, 0.5), graded(1 / per_edge, 1.0)
+            planes = {"x": [0.5 + p for p in side], "y": [0.5 + p for p in side], "z": [1.0 - p for p in height[::-1]]}
+            grid = ", ".join(f"{axis} = {values}" for axis, values in planes.items())
+            text = re.sub(r"brick = .*", f"grid = {{ {grid} }}", scene).replace('"tet4"', f'"{element}"')
+            if held == "along z":
+                text = re.sub(r"sphere = {.*?}", upright(1 / (degree * per_edge)), text)
+            with tempfile.TemporaryDirectory() as directory:
+                directory = pathlib.Path(directory)
+                (directory / "step-42.toml").write_text(text)
+                summary = run_of(directory / "step-42.toml", [], ranks, directory)
+            force = 4 * abs(summary["contact_force"][2])
+            errors = {"force": force, "beside deal.II's": force / limit - 1}
+            mesh = f"{len(side) - 1} x {len(side) - 1} x {len(height) - 1}"
+            yield {"family": f"{element}, {held}", "h": 1 / per_edge, "mesh": mesh}, summary, errors
+
+
+STUDIES = {"ring": ring, "spheres": spheres, "patch": patch, "hertz": hertz, "step-42": ball}
 
 
 def run(studies, ranks):
@@ -252,12 +339,19 @@ inner and the outer sphere. *Contact force*: mean over the surface; *contact pre
 *plastic front*: radius of a sphere that holds as much yielded volume; *plastic strain*: in the L2 norm; *displacement* of the
 outer sphere at the interface: root mean square. The last family takes the distance of the meshes instead of a clearance: the
 facets' own gaps and overlaps are as large as the displacements, and vanish with the square of the width only.""",
+    "spheres": """The same of quadratic tetrahedra (scene `scenes/precision/nested-spheres.toml`), whose nodes lie on the spheres; N/M
+are the cells along half an edge of the inner and the outer sphere.""",
     "patch": """Patch test on a curved surface: the same spheres, elastic, without a gap, a pressure in and around them. Each is under
 that pressure alone, with linear displacements, which linear elements hold exactly; all errors are those of the contact.
 Relative to the pressure.""",
     "hertz": """Hertz (scene `hertz`), against the closed form for the force that was found. *Contact radius*: of a circle as large as the
 closed nodes' share of the surface; *radius of inertia*: from the second moment of the pressure; *pressure*: in the L2 norm;
 *approach*: what was prescribed. A ball of 100 contact radii leaves about -0.7 % of the approach, whatever the mesh.""",
+    "step-42": f"""The rigid ball of deal.II's tutorial step-42 (scene `step-42`), on meshes graded towards the contact; h is the width
+of the cells there. *Force*: on the whole ball. Adaptive hexahedra of deal.II end with {forces_of_deal_ii()[0][-1]} (trilinear, going to
+{limit_of_deal_ii():.2f} by Aitken's rule) and {forces_of_deal_ii()[1][-1]} (quadratic): [all cycles](raw/deal.II-step-42.json). There nodes are held along z; here
+along the ball's normals, which tilt by up to ten degrees. *Along z* is the ball as a height field of level treads around the
+nodes, which holds them as deal.II does.""",
 }
 
 
@@ -284,8 +378,8 @@ def contents():
             cells.append(f"{row['seconds']:.1f}")
             for name in names:
                 error = row["errors"][name]
-                cell = f"{error:.2e}"
-                if same and 1e-8 < min(abs(error), abs(above["errors"][name])):
+                cell = f"{error:.2e}" if abs(error) < 20 else f"{error:.4g}"
+                if same and study != "step-42" and max(abs(error), abs(above["errors"][name])) < 20 and 1e-8 < min(abs(error), abs(above["errors"][name])):
                     ratio = np.log(abs(above["errors"][name] / error)) / np.log(above["h"] / row["h"])
                     cell += f" ({ratio:.1f})"
                 cells.append(cell)
