@@ -16,7 +16,7 @@ use crate::mesh::placement::Placement;
 use crate::mesh::quality::Quality;
 use crate::mesh::{Brick, Mapped, SolidMesh};
 use crate::results::agree::root_texts;
-use crate::scene::{self, Axis, Decomposition, Gmsh, Held, Scene};
+use crate::scene::{self, Axis, Gmsh, Held, Method, Scene};
 
 /// Why there are no meshes; the same on every rank.
 #[derive(Debug, Error)]
@@ -236,7 +236,7 @@ fn check(scene: &Scene, body: &str, mesh: &SolidMesh) -> Result<Vec<String>, Mes
 
 /// Refuses more subdomains than elements; of bricks alone the scene's own checks do.
 fn count(scene: &Scene, found: &Found) -> Result<(), MeshError> {
-    let Decomposition::Metis { subdomains: Some(subdomains) } = scene.decomposition else { return Ok(()) };
+    let Method::Metis { subdomains: Some(subdomains) } = scene.decomposition.method else { return Ok(()) };
     let bricks =
         scene.body.values().filter_map(|b| Some(b.brick()?.cell_count() * kind(b.element).per_cell() as usize));
     let elements =

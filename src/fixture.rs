@@ -12,7 +12,9 @@ use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::gather::Gather;
-use crate::feti::kernel::RigidModes;
+use crate::feti::hybrid::Hybrid;
+use crate::feti::kernel::{self, RigidModes};
+use crate::feti::operator::DualOperator;
 use crate::feti::space::RowSpace;
 use crate::material::Material;
 use crate::random::Random;
@@ -152,7 +154,7 @@ impl<'a> Setup<'a> {
         let dofs = subdomains.iter().map(Subdomain::dofs).collect();
         let gather = Gather::new(comm, &decomposition.shares, constraints, dofs);
         let space = RowSpace::new(comm, &decomposition.shares, constraints);
-        let modes = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
+        let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
         Self { comm, discrete, gather, space, modes }
     }
 
@@ -176,7 +178,7 @@ impl<'a> Setup<'a> {
     /// Without a factor.
     pub fn bare_coarse(&self) -> Coarse<'a> {
         let Discrete { decomposition, constraints, .. } = &self.discrete;
-        Coarse::new(self.comm, &decomposition.shares, self.subdomains(), &self.modes, constraints, &self.gather)
+        Coarse::new(self.comm, &decomposition.clusters, self.subdomains(), &self.modes, constraints, &self.gather)
     }
 
     /// Factors of the elastic stiffness matrices, and these.
@@ -189,6 +191,16 @@ impl<'a> Setup<'a> {
             stiffnesses.push(values);
         }
         (factors, stiffnesses)
+    }
+
+    /// `F` of the elastic bodies.
+    pub fn operator(&self) -> DualOperator<'_> {
+        let clusters = &self.discrete.decomposition.clusters;
+        let hybrid =
+            (!clusters.are_single()).then(|| Hybrid::new(clusters.of_rank(self.comm.rank()), self.subdomains()));
+        let mut operator = DualOperator::new(self.factors().0, hybrid, &self.gather);
+        operator.update_clusters().expect("bodies are whole");
+        operator
     }
 
     /// Random multipliers that depend on their rows alone: the same on any number of ranks.
@@ -233,11 +245,12 @@ impl<'a> Setup<'a> {
     /// `R`, on a single rank.
     pub fn dense_modes(&self) -> Mat<f64> {
         let total: usize = self.subdomains().iter().map(Subdomain::dofs).sum();
-        let mut r = Mat::zeros(total, 6 * self.modes.len());
+        let clusters = &self.discrete.decomposition.clusters;
+        let mut r = Mat::zeros(total, 6 * clusters.total());
         let mut row = 0;
         for (subdomain, modes) in self.subdomains().iter().zip(&self.modes) {
             for components in subdomain.points.iter().flat_map(|&point| modes.at(point)) {
-                (0..6).for_each(|k| r[(row, 6 * subdomain.id + k)] = components[k]);
+                (0..6).for_each(|k| r[(row, 6 * clusters.of(subdomain.id) + k)] = components[k]);
                 row += 1;
             }
         }

@@ -32,7 +32,8 @@ use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::coupling::Coupling;
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::gather::Gather;
-use crate::feti::kernel::RigidModes;
+use crate::feti::hybrid::Hybrid;
+use crate::feti::kernel;
 use crate::feti::operator::DualOperator;
 use crate::feti::preconditioner::{self, Preconditioner};
 use crate::feti::projector::Projector;
@@ -138,7 +139,7 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
 /// the mesh is not cut into boxes. Collective.
 pub fn expected_yielding(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<Vec<bool>>> {
     let bodies = bodies::bricks(fine)?;
-    let Cut::Bricks(cells) = discrete::cut(&fine.decomposition, &bodies) else { return None };
+    let Cut::Bricks(cells) = discrete::cut(&fine.decomposition.method, &bodies) else { return None };
     let (coarse, solved) = coarse;
     let material = |s: &Subdomain| &coarse.materials[s.material];
     let coarse = (&coarse.bodies[..], &coarse.decomposition.subdomains[..], &solved.u);
@@ -181,9 +182,9 @@ pub fn solve_from(
     let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
     let space = RowSpace::new(comm, shares, constraints);
     let sums = NodeSums::new(comm, decomposition);
-    let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
-    let mut coarse =
-        timer.time("coarse set-up", || Coarse::new(comm, shares, subdomains, &modes, constraints, &gather));
+    let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
+    let mut coarse = timer
+        .time("coarse set-up", || Coarse::new(comm, &decomposition.clusters, subdomains, &modes, constraints, &gather));
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
     let precision = match scene.solver.precision {
         scene::Precision::Mixed => Precision::Single,
@@ -232,7 +233,10 @@ pub fn solve_from(
         limit: solver.newton_limit,
         accuracy: solver.accuracy,
     };
-    let operator = DualOperator::new(Factors::new(symbolic, precision), &gather);
+    let clusters = &decomposition.clusters;
+    let hybrid = (!clusters.are_single())
+        .then(|| timer.time("clusters", || Hybrid::new(clusters.of_rank(comm.rank()), subdomains)));
+    let operator = DualOperator::new(Factors::new(symbolic, precision), hybrid, &gather);
     let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, twins(comm, subdomains));
     let report = RefCell::new(report);
     let alive = |step, applications| {

@@ -1,7 +1,7 @@
 //! Cutting brick bodies into boxes of cells, each rank generating only its own.
 
 use super::shares::{by_cost, interleave};
-use super::{BodyMesh, ElementList};
+use super::{BodyMesh, Clusters, ElementList};
 use crate::comm::{Comm, Shares};
 use crate::mesh::Brick;
 
@@ -11,22 +11,29 @@ struct Boxes<'a> {
     cells: [usize; 3],
     /// Body and number within it, x fastest, of each box.
     order: Vec<(usize, usize)>,
+    /// Number of boxes in each cluster.
+    clusters: Vec<usize>,
 }
 
 impl<'a> Boxes<'a> {
-    /// Boxes of so many cells; all bodies are bricks, and these divide their cells. `yielding` says of each body's boxes
-    /// whether they are expected to yield, which makes them dearer in every phase: a part of the order has its part of
-    /// both kinds.
-    fn new(bodies: &'a [BodyMesh], cells: [usize; 3], yielding: Option<&[Vec<bool>]>) -> Self {
+    /// Boxes of so many cells in clusters of about so many; all bodies are bricks, and the cells divide theirs. `yielding`
+    /// says of each body's boxes whether they are expected to yield, which makes them dearer in every phase: a part of the
+    /// order has its part of clusters with and without such.
+    fn new(bodies: &'a [BodyMesh], cells: [usize; 3], cluster: usize, yielding: Option<&[Vec<bool>]>) -> Self {
         let mut lists = Vec::new();
         for (body, mesh) in bodies.iter().enumerate() {
-            let yields = |&(_, k): &(usize, usize)| yielding.is_some_and(|yielding| yielding[body][k]);
-            let (dear, cheap): (Vec<_>, Vec<_>) = (0..count(mesh, cells)).map(|k| (body, k)).partition(yields);
-            lists.extend([cheap, dear]);
+            let yields = |boxes: &Vec<usize>| yielding.is_some_and(|yielding| boxes.iter().any(|&k| yielding[body][k]));
+            let (dear, cheap): (Vec<_>, Vec<_>) = blocks(along(mesh, cells), cluster).into_iter().partition(yields);
+            lists.extend([(body, cheap), (body, dear)]);
         }
-        let lengths: Vec<usize> = lists.iter().map(Vec::len).collect();
-        let order = interleave(&lengths).into_iter().map(|(list, k)| lists[list][k]).collect();
-        Self { bodies, cells, order }
+        let lengths: Vec<usize> = lists.iter().map(|list| list.1.len()).collect();
+        let (mut order, mut clusters) = (Vec::new(), Vec::new());
+        for (list, k) in interleave(&lengths) {
+            let (body, list) = &lists[list];
+            clusters.push(list[k].len());
+            order.extend(list[k].iter().map(|&number| (*body, number)));
+        }
+        Self { bodies, cells, order, clusters }
     }
 
     /// Elements of a box, by their numbers within its body.
@@ -69,16 +76,64 @@ fn along(body: &BodyMesh, cells: [usize; 3]) -> [usize; 3] {
     std::array::from_fn(|a| brick(body).cells[a] / cells[a])
 }
 
-/// Returns the shares and this rank's element lists, as many boxes for every rank; see [`Boxes::new`] for `yielding`.
+/// Blocks of about `cluster` neighbouring boxes in a body of so many along each axis, as their numbers, ascending: as near to
+/// cubes as the body lets them, and as equal as can be.
+fn blocks(counts: [usize; 3], cluster: usize) -> Vec<Vec<usize>> {
+    let (mut parts, mut left) = ([1; 3], cluster as f64);
+    let mut axes = [0, 1, 2];
+    axes.sort_by_key(|&a| counts[a]);
+    // Where a body is thin, blocks are the wider.
+    for (&a, others) in axes.iter().zip([3.0_f64, 2.0, 1.0]) {
+        parts[a] = ((counts[a] as f64 / left.powf(1.0 / others)).round() as usize).clamp(1, counts[a]);
+        left = (left * parts[a] as f64 / counts[a] as f64).max(1.0);
+    }
+    let range = |a: usize, part: usize| part * counts[a] / parts[a]..(part + 1) * counts[a] / parts[a];
+    let mut blocks = Vec::new();
+    for z in 0..parts[2] {
+        for y in 0..parts[1] {
+            for x in 0..parts[0] {
+                let rows = range(2, z).flat_map(|k| range(1, y).map(move |j| counts[0] * (j + counts[1] * k)));
+                blocks.push(rows.flat_map(|row| range(0, x).map(move |i| i + row)).collect());
+            }
+        }
+    }
+    blocks
+}
+
+/// Returns the clusters, the shares and this rank's element lists, about as many boxes for every rank; see [`Boxes::new`].
 pub(crate) fn own_elements(
     bodies: &[BodyMesh],
     cells: [usize; 3],
+    cluster: usize,
     yielding: Option<&[Vec<bool>]>,
     comm: &dyn Comm,
-) -> (Shares, Vec<ElementList>) {
-    let boxes = Boxes::new(bodies, cells, yielding);
-    let shares = by_cost(&vec![1; boxes.order.len()], comm.size());
+) -> (Clusters, Shares, Vec<ElementList>) {
+    let boxes = Boxes::new(bodies, cells, cluster, yielding);
+    let costs: Vec<u64> = boxes.clusters.iter().map(|&size| size as u64).collect();
+    let (clusters, shares) = Clusters::new(by_cost(&costs, comm.size()), &boxes.clusters);
     let first = shares.begin(comm.rank());
     let lists = (first..first + shares.0[comm.rank()]).map(|number| boxes.elements(number)).collect();
-    (shares, lists)
+    (clusters, shares, lists)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::blocks;
+
+    #[test]
+    fn blocks_fill_the_body_with_parts_as_equal_as_can_be() {
+        assert_eq!(blocks([3, 2, 1], 1), [[0], [1], [2], [3], [4], [5]]);
+        assert_eq!(
+            blocks([5, 2, 2], 12),
+            [vec![0, 1, 5, 6, 10, 11, 15, 16], vec![2, 3, 4, 7, 8, 9, 12, 13, 14, 17, 18, 19]]
+        );
+        assert_eq!(blocks([45, 15, 15], 27).len(), 15 * 5 * 5);
+        assert_eq!(blocks([2, 1, 1], 2), [[0, 1]]);
+        assert_eq!(blocks([12, 6, 1], 9).len(), 8);
+        for cluster in [1, 8, 20, 27, 1000] {
+            let mut all = blocks([7, 5, 3], cluster).concat();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..105), "{cluster}");
+        }
+    }
 }

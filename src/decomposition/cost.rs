@@ -14,9 +14,24 @@ pub fn subdomains(elements: u64, regions: usize) -> usize {
     ((elements as f64).powf(0.8) / SCALE).round().max(regions as f64) as usize
 }
 
+/// Most subdomains that have rigid motions of their own in the coarse problem.
+const SINGLE: usize = 4000;
+/// Subdomains in a cluster beyond that.
+const CLUSTER: usize = 8;
+
+/// Subdomains in a cluster, of so many in all.
+pub fn cluster(subdomains: usize) -> usize {
+    if subdomains > SINGLE { CLUSTER } else { 1 }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::subdomains;
+    use super::{cluster, subdomains};
+
+    #[test]
+    fn many_subdomains_share_rigid_motions() {
+        assert_eq!([1, 4000, 4001, 100_000].map(cluster), [1, 1, 8, 8]);
+    }
 
     #[test]
     fn subdomains_grow_with_the_mesh_and_slower() {

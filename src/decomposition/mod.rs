@@ -5,6 +5,7 @@
 //! the others just which of them share its nodes ([`interface`]).
 
 pub mod bricks;
+pub mod clusters;
 pub mod connectivity;
 pub mod cost;
 pub mod interface;
@@ -14,6 +15,7 @@ pub mod subdomain;
 pub mod sums;
 pub mod twins;
 
+pub use clusters::Clusters;
 pub use interface::InterfaceNode;
 pub use subdomain::{Facet, Subdomain};
 
@@ -166,6 +168,8 @@ pub enum Cut {
 pub struct Decomposition {
     /// Subdomains owned by each rank.
     pub shares: Shares,
+    /// Which of them share rigid motions.
+    pub clusters: Clusters,
     /// Own subdomains, in the order of their numbers.
     pub subdomains: Vec<Subdomain>,
     /// Own nodes that other subdomains share or that lie on a named surface, ascending.
@@ -193,19 +197,32 @@ pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape, Vec<usize>)>
         .collect()
 }
 
-/// Tears the bodies. `yielding` says which boxes of [`Cut::Bricks`] of each body, x fastest, are expected to yield: every
-/// rank gets its part of them. Collective.
-pub fn tear(bodies: &Bodies, cut: Cut, yielding: Option<&[Vec<bool>]>, comm: &dyn Comm) -> Decomposition {
-    let (shares, subdomains) = match cut {
+/// Tears the bodies into subdomains and these into clusters of about `cluster` (by their number if nothing is said).
+/// `yielding` says which boxes of
+/// [`Cut::Bricks`] of each body, x fastest, are expected to yield: every rank gets its part of them. Collective.
+pub fn tear(
+    bodies: &Bodies,
+    cut: Cut,
+    cluster: Option<usize>,
+    yielding: Option<&[Vec<bool>]>,
+    comm: &dyn Comm,
+) -> Decomposition {
+    let (clusters, shares, subdomains) = match cut {
         Cut::Bricks(cells) => {
-            let (shares, lists) = bricks::own_elements(bodies.bodies, cells, yielding, comm);
+            let count = bodies.bodies.iter().map(|body| bricks::count(body, cells)).sum();
+            let cluster = cluster.unwrap_or_else(|| cost::cluster(count));
+            let (clusters, shares, lists) = bricks::own_elements(bodies.bodies, cells, cluster, yielding, comm);
             let ids = shares.begin(comm.rank())..;
-            (shares, ids.zip(lists).map(|(id, (body, list))| Subdomain::of_brick(id, bodies, body, &list)).collect())
+            let of_brick = |(id, (body, list)): (usize, ElementList)| Subdomain::of_brick(id, bodies, body, &list);
+            (clusters, shares, ids.zip(lists).map(of_brick).collect())
         }
-        Cut::Metis(parts) => metis::own_subdomains(bodies, parts, comm),
+        Cut::Metis(parts) => {
+            let (shares, subdomains) = metis::own_subdomains(bodies, parts, comm);
+            (Clusters::singles(&shares), shares, subdomains)
+        }
     };
     let interface = interface::share(comm, &subdomains);
-    Decomposition { shares, subdomains, interface }
+    Decomposition { shares, clusters, subdomains, interface }
 }
 
 /// Elements of one subdomain: its body, and the numbers of its elements within the body, ascending.

@@ -221,7 +221,7 @@ fn a_body_of_several_pieces_is_cut_piece_by_piece() {
     let meshes = BTreeMap::from([(0, mesh)]);
     for parts in [1, 3, 12] {
         let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[], contact: &[] };
-        let subdomains = tear(&torn, Cut::Metis(parts), None, &Solo).subdomains;
+        let subdomains = tear(&torn, Cut::Metis(parts), None, None, &Solo).subdomains;
         assert!(subdomains.len() >= parts.max(3));
         assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
         subdomains.iter().for_each(assert_hangs_together);
@@ -273,7 +273,7 @@ fn contact_surfaces_stay_on_fewer_subdomains() {
     let surfaces = [Surface { body: 0, patch: Patch::Face(Face::ZMax) }];
     let touching = |contact: &[usize]| {
         let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &surfaces, contact };
-        let subdomains = tear(&torn, Cut::Metis(24), None, &Solo).subdomains;
+        let subdomains = tear(&torn, Cut::Metis(24), None, None, &Solo).subdomains;
         let largest = subdomains.iter().map(|s| s.elements.len()).max().unwrap();
         assert!(largest * 24 <= brick.element_count() as usize * 11 / 10, "balance holds");
         subdomains.iter().filter(|s| !s.facets.is_empty()).count()
@@ -293,7 +293,7 @@ fn boxes_that_yield_are_spread_over_the_ranks() {
     let cut = |expected: Option<&[Vec<bool>]>, ranks: usize| {
         threads::run(ranks, |comm| {
             let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
-            let own = tear(&torn, Cut::Bricks([2, 2, 2]), expected, comm).subdomains;
+            let own = tear(&torn, Cut::Bricks([2, 2, 2]), None, expected, comm).subdomains;
             own.iter().map(|s| (s.body, s.nodes.clone())).collect::<Vec<_>>()
         })
     };

@@ -2,7 +2,7 @@ use super::rule::tests::fine;
 use super::*;
 use crate::assembly::orders;
 use crate::comm::{Shares, solo::Solo};
-use crate::decomposition::Decomposition;
+use crate::decomposition::{Clusters, Decomposition};
 use crate::element::Kind;
 use crate::fixture::{Setup, built_in, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis};
 use crate::scene::Scene;
@@ -10,7 +10,9 @@ use crate::tensor::apply;
 
 /// Estimated and true error of a subdomain that is the whole body.
 fn errors(whole: &Subdomain, u: Vec<f64>, exact: &dyn Fn([f64; 3]) -> Voigt) -> [f64; 2] {
-    let alone = Decomposition { shares: Shares(vec![1]), subdomains: Vec::new(), interface: Vec::new() };
+    let shares = Shares(vec![1]);
+    let clusters = Clusters::singles(&shares);
+    let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
     let part = Part { subdomain: whole, material: &orders::MATERIAL, history: &[] };
     let c = orders::MATERIAL.elastic_tangent();
     let at = |nodes: &[u32], values: &[f64]| {

@@ -1,5 +1,5 @@
 //! Rigid motions of whole bodies: three translations, three rotations about the centre of the body's bounding box in units
-//! of its half diagonal. With `T_s` their share of the modes of subdomain `s`, a row's force on a body is `T' G` of it,
+//! of its half diagonal. With `T_c` their share of the modes of cluster `c`, a row's force on a body is `T' G` of it,
 //! in which gluing cancels.
 
 use std::fmt;
@@ -7,28 +7,29 @@ use std::fmt;
 use super::coarse::MODES;
 use super::coarse::factor::Blocks;
 use super::kernel::RigidModes;
-use crate::comm::{Comm, Shares};
-use crate::decomposition::Subdomain;
+use crate::comm::Comm;
+use crate::decomposition::{Clusters, Subdomain};
 
-/// `T` of all subdomains, on every rank.
+/// `T` of all clusters, on every rank.
 pub struct BodyMotions {
     /// Centre and half diagonal of each body.
     frames: Vec<([f64; 3], f64)>,
-    /// For each subdomain its body and `T_s`, `[mode][motion]`.
-    subdomains: Vec<(usize, [[f64; MODES]; MODES])>,
+    /// For each cluster its body and `T_c`, `[mode][motion]`.
+    clusters: Vec<(usize, [[f64; MODES]; MODES])>,
 }
 
 impl BodyMotions {
-    /// Of all bodies. Collective.
-    pub fn new(comm: &dyn Comm, shares: &Shares, subdomains: &[Subdomain], modes: &[RigidModes]) -> Self {
-        let extreme =
-            |s: &Subdomain, a: usize, sign: f64| s.points.iter().fold(f64::NEG_INFINITY, |m, p| m.max(sign * p[a]));
+    /// Of all bodies, the modes being those of the clusters for each own subdomain. Collective.
+    pub fn new(comm: &dyn Comm, clusters: &Clusters, subdomains: &[Subdomain], modes: &[RigidModes]) -> Self {
+        let members = clusters.of_rank(comm.rank());
         let mut mine = Vec::new();
-        for s in subdomains {
-            mine.push(s.body as f64);
-            (0..3).for_each(|a| mine.extend([extreme(s, a, 1.0), extreme(s, a, -1.0)]));
+        for members in members.clone() {
+            let points = || subdomains[members.clone()].iter().flat_map(|s| &s.points);
+            let extreme = |a: usize, sign: f64| points().fold(f64::NEG_INFINITY, |m, p| m.max(sign * p[a]));
+            mine.push(subdomains[members.start].body as f64);
+            (0..3).for_each(|a| mine.extend([extreme(a, 1.0), extreme(a, -1.0)]));
         }
-        let boxes = comm.all_gather(&mine, &shares.counts(7));
+        let boxes = comm.all_gather(&mine, &clusters.shares.counts(7));
         let bodies: Vec<usize> = boxes.chunks_exact(7).map(|b| b[0] as usize).collect();
         let mut extents = vec![[f64::NEG_INFINITY; 6]; bodies.iter().max().map_or(0, |last| last + 1)];
         for (values, &body) in boxes.chunks_exact(7).zip(&bodies) {
@@ -41,16 +42,21 @@ impl BodyMotions {
         };
         let frames: Vec<_> = extents.iter().map(frame).collect();
         let mut mine = Vec::new();
-        for (s, modes) in subdomains.iter().zip(modes) {
+        for members in members {
             for motion in 0..MODES {
-                let at = |x: &[f64; 3]| displacement(&frames[s.body], motion, x);
-                mine.extend(modes.resultants(&s.points, &s.points.iter().flat_map(at).collect::<Vec<_>>()));
+                let mut sum = [0.0; MODES];
+                for (s, modes) in subdomains[members.clone()].iter().zip(&modes[members.clone()]) {
+                    let at = |x: &[f64; 3]| displacement(&frames[s.body], motion, x);
+                    let moved: Vec<f64> = s.points.iter().flat_map(at).collect();
+                    sum.iter_mut().zip(modes.resultants(&s.points, &moved)).for_each(|(sum, x)| *sum += x);
+                }
+                mine.extend(sum);
             }
         }
-        let columns = comm.all_gather(&mine, &shares.counts(MODES * MODES));
+        let columns = comm.all_gather(&mine, &clusters.shares.counts(MODES * MODES));
         let matrices = columns.chunks_exact(MODES * MODES);
         let matrix = |c: &[f64]| std::array::from_fn(|mode| std::array::from_fn(|motion| c[MODES * motion + mode]));
-        Self { subdomains: bodies.into_iter().zip(matrices.map(matrix)).collect(), frames }
+        Self { clusters: bodies.into_iter().zip(matrices.map(matrix)).collect(), frames }
     }
 
     /// Number of bodies.
@@ -58,21 +64,21 @@ impl BodyMotions {
         self.frames.len()
     }
 
-    /// Adds a force on a subdomain's modes to that on its body, six numbers a body.
-    pub fn add_force(&self, subdomain: usize, modes: &[f64], forces: &mut [f64]) {
-        let (body, matrix) = &self.subdomains[subdomain];
+    /// Adds a force on a cluster's modes to that on its body, six numbers a body.
+    pub fn add_force(&self, cluster: usize, modes: &[f64], forces: &mut [f64]) {
+        let (body, matrix) = &self.clusters[cluster];
         for (row, f) in matrix.iter().zip(modes) {
             forces[MODES * body..][..MODES].iter_mut().zip(row).for_each(|(force, t)| *force += t * f);
         }
     }
 
-    /// `T motion`, six numbers a subdomain.
+    /// `T motion`, six numbers a cluster.
     pub fn amplitudes(&self, motion: &[f64]) -> Vec<f64> {
         let of = |(body, matrix): &(usize, [[f64; MODES]; MODES])| {
             let motion = &motion[MODES * body..][..MODES];
             matrix.map(|row| row.iter().zip(motion).map(|(t, m)| t * m).sum::<f64>())
         };
-        self.subdomains.iter().flat_map(of).collect()
+        self.clusters.iter().flat_map(of).collect()
     }
 
     /// Motions, orthonormal, that meet no resistance in `T' blocks T`, of the lower blocks of `G G'` for some rows.
@@ -82,7 +88,7 @@ impl BodyMotions {
         for (&(row, column), block) in blocks {
             for j in 0..MODES {
                 // The force of the column's motion on the row's body; its transpose where that is a block above.
-                let (body, matrix) = &self.subdomains[column];
+                let (body, matrix) = &self.clusters[column];
                 let motion = MODES * body + j;
                 let product: Vec<f64> =
                     (0..MODES).map(|i| (0..MODES).map(|k| block[MODES * i + k] * matrix[k][j]).sum()).collect();
@@ -99,9 +105,9 @@ impl BodyMotions {
         complement(&gram, n)
     }
 
-    /// The first subdomain of each body.
-    pub fn first_subdomains(&self) -> Vec<usize> {
-        let first = |body| self.subdomains.iter().position(|s| s.0 == body).expect("a body has a subdomain");
+    /// The first cluster of each body.
+    pub fn first_clusters(&self) -> Vec<usize> {
+        let first = |body| self.clusters.iter().position(|c| c.0 == body).expect("a body has a cluster");
         (0..self.bodies()).map(first).collect()
     }
 

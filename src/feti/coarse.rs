@@ -1,11 +1,12 @@
-//! `G = R'B'` and the coarse problem `G G' a = r`: six unknowns a subdomain.
+//! `G = R'B'` and the coarse problem `G G' a = r`: six unknowns a cluster of subdomains, which in plain Total FETI is one.
 //!
-//! `G x` is local to each subdomain; one all-gather brings it to every rank, each of which holds the sparse Cholesky
+//! `G x` is local to each cluster; one all-gather brings it to every rank, each of which holds the sparse Cholesky
 //! factor of `G G'` and solves redundantly: ranks agree to the last bit, and `G'a` needs no further exchange.
 
 pub mod factor;
 
 use std::cell::OnceCell;
+use std::ops::Range;
 use std::rc::Rc;
 
 use thiserror::Error;
@@ -15,11 +16,11 @@ use super::bodies::BodyMotions;
 use super::gather::Gather;
 use super::kernel::RigidModes;
 use super::space::RowSpace;
-use crate::comm::{Comm, Shares, all_gather_u64};
-use crate::constraint::Constraints;
-use crate::decomposition::Subdomain;
+use crate::comm::{Comm, all_gather_u64};
+use crate::constraint::{Constraints, Kind};
+use crate::decomposition::{Clusters, Subdomain};
 
-/// Rigid modes a subdomain.
+/// Rigid modes a cluster.
 pub const MODES: usize = 6;
 
 /// The constraints leave a rigid motion free.
@@ -36,12 +37,14 @@ pub struct Floating {
 /// `G` and the factor of `G G'`.
 pub struct Coarse<'a> {
     comm: &'a dyn Comm,
-    shares: Shares,
-    /// Rows of `G'`: for each slot of each row, the subdomain and its six modes' values.
+    clusters: Clusters,
+    /// Own clusters, as ranges of own subdomains.
+    members: Vec<Range<usize>>,
+    /// Rows of `G'`: for each slot of each row, the cluster and its six modes' values. Gluing within a cluster has none.
     slot_begin: Vec<u32>,
-    slot_subdomain: Vec<u32>,
+    slot_cluster: Vec<u32>,
     slot_modes: Vec<[f64; MODES]>,
-    /// For each own subdomain, its (row, slot) in row order.
+    /// For each own cluster, its (row, slot) in row order.
     own_slots: Vec<Vec<(u32, u32)>>,
     motions: BodyMotions,
     /// For all rows, and so for any.
@@ -51,17 +54,20 @@ pub struct Coarse<'a> {
 }
 
 impl<'a> Coarse<'a> {
-    /// Computes `G`. Nothing is solved before [`Coarse::factorise`]. Collective.
+    /// Computes `G` of the clusters' `modes`, given for each own subdomain. Nothing is solved before [`Coarse::factorise`].
+    /// Collective.
     pub fn new(
         comm: &'a dyn Comm,
-        shares: &Shares,
+        clusters: &Clusters,
         subdomains: &[Subdomain],
         modes: &[RigidModes],
         constraints: &Constraints,
         gather: &Gather,
     ) -> Self {
-        let slots = constraints.slot_subdomain.len();
-        let mut slot_modes = vec![[0.0; MODES]; slots];
+        let first = clusters.shares.begin(comm.rank());
+        let members: Vec<Range<usize>> = clusters.of_rank(comm.rank()).collect();
+        let mut own_slots = vec![Vec::new(); members.len()];
+        let (mut slot_begin, mut slot_cluster, mut slot_modes) = (vec![0], Vec::new(), Vec::new());
         gather.exchange(
             MODES,
             |own, slots| {
@@ -73,20 +79,39 @@ impl<'a> Coarse<'a> {
                 }
             },
             |row, values| {
-                for (slot, six) in constraints.slots(row).zip(values.chunks_exact(MODES)) {
-                    slot_modes[slot].copy_from_slice(six);
+                let begin = slot_cluster.len();
+                for (slot, six) in constraints.slots(row).zip(values.as_chunks::<MODES>().0) {
+                    let cluster = clusters.of(constraints.slot_subdomain[slot] as usize) as u32;
+                    // Copies of one node, unless it is contact.
+                    if !constraints.rows[row].is_inequality() && slot_cluster[begin..].last() == Some(&cluster) {
+                        let sum: &mut [f64; MODES] = slot_modes.last_mut().expect("it has a cluster");
+                        sum.iter_mut().zip(six).for_each(|(s, x)| *s += x);
+                    } else {
+                        slot_cluster.push(cluster);
+                        slot_modes.push(*six);
+                    }
                 }
+                if constraints.rows[row].kind == Kind::Gluing && slot_cluster.len() == begin + 1 {
+                    slot_cluster.truncate(begin);
+                    slot_modes.truncate(begin);
+                }
+                for (slot, &cluster) in (begin..).zip(&slot_cluster[begin..]) {
+                    if let Some(slots) = (cluster as usize).checked_sub(first).and_then(|own| own_slots.get_mut(own)) {
+                        slots.push((row as u32, slot as u32));
+                    }
+                }
+                slot_begin.push(slot_cluster.len() as u32);
             },
         );
-        let own_slots = gather_own_slots(constraints, gather, subdomains.len());
         Self {
             comm,
-            shares: shares.clone(),
-            slot_begin: constraints.slot_begin.clone(),
-            slot_subdomain: constraints.slot_subdomain.clone(),
+            motions: BodyMotions::new(comm, clusters, subdomains, modes),
+            clusters: clusters.clone(),
+            members,
+            slot_begin,
+            slot_cluster,
             slot_modes,
             own_slots,
-            motions: BodyMotions::new(comm, shares, subdomains, modes),
             symbolic: OnceCell::new(),
             factor: None,
         }
@@ -98,7 +123,7 @@ impl<'a> Coarse<'a> {
     /// If it is singular: on every rank.
     pub fn factorise(&mut self) -> Result<(), Floating> {
         let blocks = self.blocks(|_| true);
-        self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&blocks, self.shares.total())));
+        self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&blocks, self.clusters.total())));
         self.factor = Some(self.factor_of(&blocks)?);
         Ok(())
     }
@@ -116,12 +141,10 @@ impl<'a> Coarse<'a> {
     /// # Errors
     /// If they are singular: on every rank.
     pub fn factor_of(&self, blocks: &Blocks) -> Result<CoarseFactor, Floating> {
-        let subdomains = self.shares.total();
-        let symbolic = self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&self.blocks(|_| true), subdomains)));
-        if symbolic.holds(blocks) {
-            return CoarseFactor::new(symbolic, blocks);
-        }
-        CoarseFactor::new(&Rc::new(Symbolic::new(blocks, subdomains)), blocks)
+        let clusters = self.clusters.total();
+        let symbolic = self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&self.blocks(|_| true), clusters)));
+        let fitting = if symbolic.holds(blocks) { symbolic } else { &Rc::new(Symbolic::new(blocks, clusters)) };
+        CoarseFactor::new(fitting, blocks).map_err(|cluster| Floating { subdomain: self.clusters.first(cluster) })
     }
 
     /// The blocks of `G G'` of the kept rows, lower triangle, on every rank. Collective.
@@ -129,7 +152,7 @@ impl<'a> Coarse<'a> {
         share_blocks(self.comm, &self.own_blocks(kept))
     }
 
-    /// `G' motion` of all rows, of six numbers a subdomain. Local.
+    /// `G' motion` of all rows, of six numbers a cluster. Local.
     pub fn moved(&self, motion: &[f64]) -> Vec<f64> {
         let mut rows = vec![0.0; self.slot_begin.len() - 1];
         self.add_transpose(1.0, motion, &mut rows);
@@ -145,20 +168,20 @@ impl<'a> Coarse<'a> {
     pub fn force_on_bodies(&self, row: usize) -> Vec<f64> {
         let mut forces = vec![0.0; MODES * self.motions.bodies()];
         for slot in self.slots(row) {
-            self.motions.add_force(self.slot_subdomain[slot] as usize, &self.slot_modes[slot], &mut forces);
+            self.motions.add_force(self.slot_cluster[slot] as usize, &self.slot_modes[slot], &mut forces);
         }
         forces
     }
 
-    /// Block rows of `G G'` that belong to own subdomains, lower triangle. Complete: every row that a subdomain takes
+    /// Block rows of `G G'` that belong to own clusters, lower triangle. Complete: every row that a subdomain takes
     /// part in is on its rank.
     fn own_blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
-        let first = self.shares.begin(self.comm.rank());
+        let first = self.clusters.shares.begin(self.comm.rank());
         let mut blocks = Blocks::new();
         for (own, slots) in self.own_slots.iter().enumerate() {
             for &(row, slot) in slots.iter().filter(|(row, _)| kept(*row as usize)) {
                 for other in self.slots(row as usize) {
-                    let column = self.slot_subdomain[other] as usize;
+                    let column = self.slot_cluster[other] as usize;
                     if column > first + own {
                         continue;
                     }
@@ -180,7 +203,7 @@ impl<'a> Coarse<'a> {
 
     /// `G rows`, whole on every rank. One all-gather.
     pub fn apply(&self, rows: &[f64]) -> Vec<f64> {
-        self.share(self.resultants(rows).as_flattened())
+        self.comm.all_gather(self.resultants(rows).as_flattened(), &self.clusters.shares.counts(MODES))
     }
 
     /// As [`Coarse::apply`], and in the same all-gather the square of `rows`, and its inner products with each of
@@ -195,17 +218,18 @@ impl<'a> Coarse<'a> {
         let mut all = vec![(rows, rows)];
         all.extend(against.iter().map(|other| (rows, *other)));
         all.extend(pairs);
-        let (width, partial) = (all.len(), space.partial(&all));
-        let mut mine = Vec::with_capacity((MODES + width) * self.own_slots.len());
+        let width = all.len();
+        let partial = self.over_members(&space.partial(&all), width);
+        let mut mine = Vec::with_capacity((MODES + width) * self.members.len());
         for (six, values) in self.resultants(rows).iter().zip(partial.chunks_exact(width)) {
             mine.extend_from_slice(six);
             mine.extend_from_slice(values);
         }
-        let all = self.comm.all_gather(&mine, &self.shares.counts(MODES + width));
+        let all = self.comm.all_gather(&mine, &self.clusters.shares.counts(MODES + width));
         let mut sums = vec![0.0; width];
-        let mut result = Vec::with_capacity(MODES * self.shares.total());
-        for of_subdomain in all.chunks_exact(MODES + width) {
-            let (six, values) = of_subdomain.split_at(MODES);
+        let mut result = Vec::with_capacity(MODES * self.clusters.total());
+        for of_cluster in all.chunks_exact(MODES + width) {
+            let (six, values) = of_cluster.split_at(MODES);
             result.extend_from_slice(six);
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
         }
@@ -213,9 +237,9 @@ impl<'a> Coarse<'a> {
         (result, square, sums)
     }
 
-    /// `G rows` of the own subdomains.
+    /// `G rows` of the own clusters.
     fn resultants(&self, rows: &[f64]) -> Vec<[f64; MODES]> {
-        let of_subdomain = |slots: &Vec<(u32, u32)>| {
+        let of_cluster = |slots: &Vec<(u32, u32)>| {
             let mut sum = [0.0; MODES];
             for &(row, slot) in slots {
                 let x = rows[row as usize];
@@ -223,12 +247,30 @@ impl<'a> Coarse<'a> {
             }
             sum
         };
-        self.own_slots.iter().map(of_subdomain).collect()
+        self.own_slots.iter().map(of_cluster).collect()
     }
 
-    /// Brings six numbers an own subdomain to every rank.
+    /// Sums six numbers an own subdomain over each cluster and brings them to every rank.
     pub fn share(&self, mine: &[f64]) -> Vec<f64> {
-        self.comm.all_gather(mine, &self.shares.counts(MODES))
+        self.comm.all_gather(&self.over_members(mine, MODES), &self.clusters.shares.counts(MODES))
+    }
+
+    /// Sums of `width` numbers an own subdomain over each own cluster.
+    fn over_members(&self, mine: &[f64], width: usize) -> Vec<f64> {
+        let mut sums = Vec::with_capacity(width * self.members.len());
+        for members in &self.members {
+            let begin = sums.len();
+            sums.extend_from_slice(&mine[width * members.start..][..width]);
+            for of_member in mine[width * (members.start + 1)..width * members.end].chunks_exact(width) {
+                sums[begin..].iter_mut().zip(of_member).for_each(|(s, x)| *s += x);
+            }
+        }
+        sums
+    }
+
+    /// Of six numbers a cluster, those for a subdomain.
+    pub fn of_subdomain<'b>(&self, subdomain: usize, amplitudes: &'b [f64]) -> &'b [f64] {
+        &amplitudes[MODES * self.clusters.of(subdomain)..][..MODES]
     }
 
     /// `(G G')^-1 a`, in place. Local.
@@ -241,7 +283,7 @@ impl<'a> Coarse<'a> {
         for (row, x) in rows.iter_mut().enumerate() {
             let mut sum = 0.0;
             for slot in self.slots(row) {
-                let at = MODES * self.slot_subdomain[slot] as usize;
+                let at = MODES * self.slot_cluster[slot] as usize;
                 sum += self.slot_modes[slot].iter().zip(&a[at..at + MODES]).map(|(g, a)| g * a).sum::<f64>();
             }
             *x += factor * sum;
@@ -259,18 +301,6 @@ fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
     all_gather_u64(comm, &message)
         .chunks_exact(2 + MODES * MODES)
         .map(|m| ((m[0] as usize, m[1] as usize), std::array::from_fn(|k| f64::from_bits(m[2 + k]))))
-        .collect()
-}
-
-/// For each own subdomain, the rows it takes part in and its slots there.
-fn gather_own_slots(constraints: &Constraints, gather: &Gather, own: usize) -> Vec<Vec<(u32, u32)>> {
-    (0..own)
-        .map(|own| {
-            let mut slots: Vec<(u32, u32)> = gather.entries(own).iter().map(|e| (e.row, e.slot)).collect();
-            slots.dedup();
-            debug_assert!(slots.iter().all(|&(row, slot)| constraints.slots(row as usize).contains(&(slot as usize))));
-            slots
-        })
         .collect()
 }
 

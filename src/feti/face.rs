@@ -3,7 +3,7 @@
 //! With `I_A` the mask of these rows it knows `G_A = G I_A`, the factor of `G_A G_A'` and the projector
 //! `P_A = I_A - G_A'(G_A G_A')^-1 G_A` onto what keeps the balance and leaves open contacts without force.
 //!
-//! These rows may leave rigid motions `N` of whole bodies free (`G_A'N = 0`). Then the first subdomain of each body is
+//! These rows may leave rigid motions `N` of whole bodies free (`G_A'N = 0`). Then the first cluster of each body is
 //! tied: with `C` the rows of `N` there, `(G_A G_A' + C C')^-1` is a generalised inverse of `G_A G_A'`, exact for all
 //! right-hand sides orthogonal to `N`, since `N'C C'a = 0` leaves `C'a = 0`.
 
@@ -16,7 +16,7 @@ use super::space::RowSpace;
 pub struct CoarseFace {
     kept: Vec<bool>,
     factor: CoarseFactor,
-    /// `N`, six numbers a subdomain.
+    /// `N`, six numbers a cluster.
     free: Vec<Vec<f64>>,
 }
 
@@ -42,12 +42,12 @@ impl CoarseFace {
             .map(|(factor, free)| Self { kept, factor, free })
     }
 
-    /// Rigid motions of whole bodies that the kept rows leave free, six numbers a subdomain.
+    /// Rigid motions of whole bodies that the kept rows leave free, six numbers a cluster.
     pub fn free(&self) -> &[Vec<f64>] {
         &self.free
     }
 
-    /// The part of the forces `e` on all subdomains that the kept rows cannot balance, as a motion. Nothing if it is rounding
+    /// The part of the forces `e` on all clusters that the kept rows cannot balance, as a motion. Nothing if it is rounding
     /// beside forces of this size.
     pub fn unbalanced(&self, e: &[f64], size: f64) -> Option<Vec<f64>> {
         let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
@@ -133,11 +133,11 @@ const BALANCED: f64 = 1e-10;
 
 /// Adds `C C'` to the blocks, in their size.
 fn tie(motions: &BodyMotions, free: &[Vec<f64>], blocks: &mut Blocks) {
-    let first = motions.first_subdomains();
+    let first = motions.first_clusters();
     let size = blocks.values().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
     for motion in free {
-        let of = |subdomain: usize| &motion[MODES * subdomain..][..MODES];
-        let largest = first.iter().flat_map(|&s| of(s)).fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        let of = |cluster: usize| &motion[MODES * cluster..][..MODES];
+        let largest = first.iter().flat_map(|&c| of(c)).fold(0.0_f64, |largest, x| largest.max(x.abs()));
         let weight = size / (largest * largest);
         for &row in &first {
             for &column in first.iter().filter(|&&column| column <= row) {

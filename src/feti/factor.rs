@@ -92,6 +92,9 @@ pub struct Factors {
     precision: Precision,
     workspace: Workspace,
     shifted: Vec<f64>,
+    /// What tells factors apart: equal numbers, equal factors.
+    stamps: Vec<u64>,
+    made: u64,
 }
 
 impl Factors {
@@ -99,7 +102,8 @@ impl Factors {
     pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
         let factors = Stock::new(symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)));
-        Self { symbolic, factors, precision, workspace, shifted: Vec::new() }
+        let stamps = vec![0; symbolic.len()];
+        Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0 }
     }
 
     /// Symbolic analysis of an own subdomain.
@@ -140,6 +144,8 @@ impl Factors {
         if !rho.is_finite() {
             return Err(refuse(0));
         }
+        self.made += 1;
+        self.stamps[own] = self.made;
         let factor = self.factors.renew(own, common, || Factor::new(cholesky, self.precision));
         if factor.precision() != self.precision {
             *factor = Factor::new(cholesky, self.precision);
@@ -159,11 +165,34 @@ impl Factors {
     /// From now on an own subdomain has the factor of a congruent one with equal stiffness.
     pub fn share(&mut self, own: usize, twin: usize) {
         self.factors.share(own, twin, true);
+        self.stamps[own] = self.stamps[twin];
+    }
+
+    /// A number that is the same as before, or as that of another, as long as the factor is.
+    pub fn stamp(&self, own: usize) -> u64 {
+        self.stamps[own]
     }
 
     /// Bytes of factors that one [`Factors::solve`] reads, forward and backward.
     pub fn bytes_per_solve(&self) -> f64 {
         self.factors.sum(|factor| 2.0 * factor.bytes() as f64)
+    }
+
+    /// `columns = K^+ columns` for several vectors of an own subdomain, one behind the other.
+    pub fn solve_columns(&mut self, own: usize, columns: &mut [f64]) {
+        let cholesky = &self.symbolic[own].cholesky;
+        let n = self.symbolic[own].pattern.dofs();
+        let mut panel = vec![[0.0; WIDTH]; n];
+        for columns in columns.chunks_mut(WIDTH * n) {
+            panel.fill([0.0; WIDTH]);
+            for (lane, column) in columns.chunks_exact(n).enumerate() {
+                panel.iter_mut().zip(column).for_each(|(panel, x)| panel[lane] = *x);
+            }
+            self.workspace.solve_wide(cholesky, self.factors.of(own), panel.as_flattened_mut());
+            for (lane, column) in columns.chunks_exact_mut(n).enumerate() {
+                column.iter_mut().zip(&panel).for_each(|(x, panel)| *x = panel[lane]);
+            }
+        }
     }
 
     /// `x = K^+ x`, subdomain by subdomain.

@@ -4,6 +4,10 @@
 //! the Cholesky factor of their 3x3 Gram matrix (the inertia tensor of the nodes). Pivots play no part: a face-connected
 //! set of tetrahedra has exactly these modes.
 
+use std::ops::Range;
+
+use crate::decomposition::Subdomain;
+
 /// Orthonormal rigid modes: columns 0..3 translations, 3..6 rotations.
 #[derive(Clone, Debug)]
 pub struct RigidModes {
@@ -64,6 +68,16 @@ impl RigidModes {
             }
         }
     }
+}
+
+/// The modes of each cluster, given by its range of own subdomains, for each of its members: orthonormal over all of them.
+pub fn of_clusters(clusters: impl Iterator<Item = Range<usize>>, subdomains: &[Subdomain]) -> Vec<RigidModes> {
+    let mut modes = Vec::with_capacity(subdomains.len());
+    for members in clusters {
+        let points: Vec<[f64; 3]> = subdomains[members.clone()].iter().flat_map(|s| s.points.iter().copied()).collect();
+        modes.resize(members.end, RigidModes::new(&points));
+    }
+    modes
 }
 
 /// `L^-1` of `gram = L L'`.

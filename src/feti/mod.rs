@@ -11,6 +11,7 @@ pub mod face;
 pub mod factor;
 pub mod gather;
 pub mod gram;
+pub mod hybrid;
 pub mod kernel;
 pub mod operator;
 pub mod ordering;

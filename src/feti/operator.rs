@@ -1,22 +1,56 @@
-//! `F = B K^+ B'`, applied subdomain by subdomain through the factors.
+//! `F = B K^+ B'`, applied subdomain by subdomain through the factors, or cluster by cluster.
 
 use super::Torn;
 use super::factor::Factors;
 use super::gather::Gather;
+use super::hybrid::Hybrid;
 
 /// The dual operator; counts its applications.
 pub struct DualOperator<'a> {
     /// Factors of all own subdomains.
     pub factors: Factors,
+    hybrid: Option<Hybrid>,
     gather: &'a Gather<'a>,
     torn: Torn,
     applications: usize,
 }
 
 impl<'a> DualOperator<'a> {
-    /// On factors that will be computed before the first application.
-    pub fn new(factors: Factors, gather: &'a Gather<'a>) -> Self {
-        Self { factors, gather, torn: gather.zeros(), applications: 0 }
+    /// On factors that will be computed before the first application, with clusters if there are any.
+    pub fn new(factors: Factors, hybrid: Option<Hybrid>, gather: &'a Gather<'a>) -> Self {
+        Self { factors, hybrid, gather, torn: gather.zeros(), applications: 0 }
+    }
+
+    /// Whether there are clusters.
+    pub fn is_hybrid(&self) -> bool {
+        self.hybrid.is_some()
+    }
+
+    /// Makes the clusters follow the factors.
+    ///
+    /// # Errors
+    /// An own subdomain of a cluster whose members nothing holds together.
+    pub fn update_clusters(&mut self) -> Result<(), usize> {
+        self.hybrid.as_mut().map_or(Ok(()), |hybrid| hybrid.update(&mut self.factors))
+    }
+
+    /// `torn = K^+ torn`, of clusters if there are any. Local.
+    pub fn invert(&mut self, torn: &mut Torn) {
+        match &mut self.hybrid {
+            Some(hybrid) => hybrid.solve(&mut self.factors, torn),
+            None => self.factors.solve(torn),
+        }
+    }
+
+    /// By `B`, the forces by which the members of clusters held each other in the last [`DualOperator::invert`]: added to
+    /// multipliers that balance clusters, they balance each subdomain. `None` without clusters. One neighbour exchange.
+    pub fn bonds(&self) -> Option<Vec<f64>> {
+        let hybrid = self.hybrid.as_ref()?;
+        let mut torn = self.gather.zeros();
+        hybrid.add_forces(&mut torn);
+        let mut rows = vec![0.0; self.gather.rows()];
+        self.gather.apply(&torn, &mut rows);
+        Some(rows)
     }
 
     /// `y = F x`. One neighbour exchange.
@@ -26,15 +60,17 @@ impl<'a> DualOperator<'a> {
             local.fill(0.0);
             self.gather.add_transpose_one(own, 1.0, x, local);
         }
-        self.factors.solve(&mut self.torn);
-        self.gather.apply(&self.torn, y);
+        let mut torn = std::mem::take(&mut self.torn);
+        self.invert(&mut torn);
+        self.gather.apply(&torn, y);
+        self.torn = torn;
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`: costs and counts as one application of F.
     pub fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64]) {
         self.applications += 1;
         self.gather.add_transpose(-1.0, x, torn);
-        self.factors.solve(torn);
+        self.invert(torn);
         self.gather.apply(torn, y);
     }
 
@@ -54,13 +90,9 @@ mod tests {
         two_bricks_by_metis,
     };
 
-    fn operator<'a>(setup: &'a Setup<'a>) -> DualOperator<'a> {
-        DualOperator::new(setup.factors().0, &setup.gather)
-    }
-
     /// `F` by its columns.
     fn columns(setup: &Setup) -> Mat<f64> {
-        let mut operator = operator(setup);
+        let mut operator = setup.operator();
         let n = setup.rows().len();
         let mut f = Mat::zeros(n, n);
         let (mut unit, mut image) = (vec![0.0; n], vec![0.0; n]);
@@ -118,7 +150,7 @@ mod tests {
     #[test]
     fn responds_with_the_displacements_under_forces_and_multipliers() {
         on_ranks(&two_bricks(&[]), 1, |setup| {
-            let mut operator = operator(setup);
+            let mut operator = setup.operator();
             let forces = setup.displacements(5);
             let x = setup.multipliers(6);
             let [mut y, mut fx, mut bkf] = [(); 3].map(|()| vec![0.0; x.len()]);
@@ -139,7 +171,7 @@ mod tests {
         for scene in [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[])] {
             same_on_any_ranks(&scene, |setup| {
                 let mut image = vec![0.0; setup.rows().len()];
-                operator(setup).apply(&setup.multipliers(7), &mut image);
+                setup.operator().apply(&setup.multipliers(7), &mut image);
                 setup.owned(&image)
             });
         }

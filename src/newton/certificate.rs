@@ -76,7 +76,13 @@ impl StepSolver<'_> {
         lambda: &[f64],
         timer: &Timer,
     ) -> Certificate {
-        let (lambda, balanced) = timer.time("coarse problem", || self.balance(problem, lambda));
+        let (mut lambda, balanced) = timer.time("coarse problem", || self.balance(problem, lambda));
+        if self.operator.is_hybrid() {
+            let mut torn = problem.unbalance(state);
+            problem.gather.add_transpose(-1.0, &lambda, &mut torn);
+            timer.time("certificate", || self.operator.invert(&mut torn));
+            self.operator.bonds().iter().for_each(|bonds| problem.add_gluing(bonds, &mut lambda));
+        }
         let pull: Vec<f64> = lambda
             .iter()
             .zip(&problem.constraints.rows)

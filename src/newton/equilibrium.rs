@@ -31,7 +31,7 @@ pub struct Unheld {
 /// Forces smaller than this share of all are nothing.
 const NOTHING: f64 = 1e-9;
 
-/// Whether all bodies are held at the end of each stage, where loads have the resultants `R'f` (six numbers a subdomain,
+/// Whether all bodies are held at the end of each stage, where loads have the resultants `R'f` (six numbers a cluster,
 /// collective), which are asked for only if supports leave some body free. Collective.
 ///
 /// # Errors
@@ -62,11 +62,11 @@ pub fn check(
     };
     for (stage, resultants) in (0..stages).map(|stage| (stage, resultants(stage))) {
         let (mut force, mut all) = (vec![0.0; MODES * motions.bodies()], 0.0);
-        for (subdomain, modes) in resultants.chunks_exact(MODES).enumerate() {
-            let mut of_subdomain = vec![0.0; force.len()];
-            motions.add_force(subdomain, modes, &mut of_subdomain);
-            all += size(&of_subdomain);
-            force.iter_mut().zip(of_subdomain).for_each(|(f, s)| *f += s);
+        for (cluster, modes) in resultants.chunks_exact(MODES).enumerate() {
+            let mut of_cluster = vec![0.0; force.len()];
+            motions.add_force(cluster, modes, &mut of_cluster);
+            all += size(&of_cluster);
+            force.iter_mut().zip(of_cluster).for_each(|(f, s)| *f += s);
         }
         let load = along(&force);
         let left = nnls::solve(&pushes, &load).residual;

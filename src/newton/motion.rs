@@ -8,7 +8,7 @@ use crate::feti::face::CoarseFace;
 use crate::feti::space::RowSpace;
 use crate::qp::nnls;
 
-/// The amplitudes `a` of all subdomains' modes that make `residual - G'a` smallest on the kept rows and, if that leaves a
+/// The amplitudes `a` of all clusters' modes that make `residual - G'a` smallest on the kept rows and, if that leaves a
 /// choice, nowhere positive on the others, where that is possible. Collective.
 pub fn amplitudes(face: &CoarseFace, coarse: &Coarse, space: &RowSpace, residual: &[f64]) -> Vec<f64> {
     let mut a = face.amplitudes(coarse, residual);

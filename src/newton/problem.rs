@@ -20,7 +20,7 @@ pub struct TornProblem<'a> {
     pub subdomains: &'a [Subdomain],
     /// Material of each own subdomain.
     pub materials: Vec<Material>,
-    /// Rigid modes of each own subdomain.
+    /// Rigid modes of each own subdomain's cluster.
     pub modes: &'a [RigidModes],
     /// `f`: nodal forces.
     pub loads: Torn,
@@ -127,6 +127,13 @@ impl TornProblem<'_> {
         let norms: Vec<f64> = self.space.sum(&partial, 3).into_iter().map(f64::sqrt).collect();
         let size = (norms[1] + norms[2]).max(SIGNIFICANT * terms.energy.sqrt()).max(self.committed.sizes.elastic_norm);
         if norms[0] == 0.0 { 0.0 } else { norms[0] / size }
+    }
+
+    /// Adds the gluing rows' part of `change` to multipliers.
+    pub fn add_gluing(&self, change: &[f64], lambda: &mut [f64]) {
+        let gluing =
+            self.constraints.rows.iter().zip(change).zip(lambda).filter(|((row, _), _)| row.kind == Kind::Gluing);
+        gluing.for_each(|((_, change), l)| *l += change);
     }
 
     /// `c - B u`: what is left until each constraint holds. One neighbour exchange.

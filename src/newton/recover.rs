@@ -6,10 +6,10 @@
 use super::problem::TornProblem;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
-use crate::feti::coarse::{Coarse, MODES};
+use crate::feti::coarse::Coarse;
 use crate::feti::kernel::RigidModes;
 
-/// `R'f` from own subdomains, whole on every rank. One all-gather.
+/// `R'f`, six numbers a cluster, from own subdomains, whole on every rank. One all-gather.
 pub fn resultants(subdomains: &[Subdomain], modes: &[RigidModes], coarse: &Coarse, forces: &Torn) -> Vec<f64> {
     let mut mine = Vec::new();
     for ((subdomain, modes), f) in subdomains.iter().zip(modes).zip(forces) {
@@ -19,9 +19,9 @@ pub fn resultants(subdomains: &[Subdomain], modes: &[RigidModes], coarse: &Coars
 }
 
 /// Adds `factor R a` to a torn displacement.
-pub fn add_rigid_motion(problem: &TornProblem, factor: f64, amplitudes: &[f64], torn: &mut Torn) {
-    let amplitudes: Vec<f64> = amplitudes.iter().map(|a| factor * a).collect();
+pub fn add_rigid_motion(problem: &TornProblem, coarse: &Coarse, factor: f64, amplitudes: &[f64], torn: &mut Torn) {
     for ((subdomain, modes), local) in problem.subdomains.iter().zip(problem.modes).zip(torn) {
-        modes.add_motion(&subdomain.points, &amplitudes[MODES * subdomain.id..][..MODES], local);
+        let amplitudes: Vec<f64> = coarse.of_subdomain(subdomain.id, amplitudes).iter().map(|a| factor * a).collect();
+        modes.add_motion(&subdomain.points, &amplitudes, local);
     }
 }

@@ -289,13 +289,18 @@ impl<'a> StepSolver<'a> {
             alive: &|applications| alive(applications - before),
         };
         let found = self.programs.solve(problem, dual, warm, b, forcing).map_err(|floating| floating.to_string())?;
-        let Found { lambda, balanced, outcome, statistics, at_floor } = found;
+        let Found { mut lambda, mut balanced, outcome, statistics, at_floor } = found;
 
         let mut defect = vec![0.0; rows];
-        let mut local = forces.clone();
-        problem.gather.add_transpose(-1.0, &balanced, &mut local);
-        let mut du = forces;
+        let mut du = forces.clone();
         self.respond(&balanced, &mut du, &mut defect, timer);
+        if let Some(bonds) = self.operator.bonds() {
+            problem.add_gluing(&bonds, &mut lambda);
+            problem.add_gluing(&bonds, &mut balanced);
+            self.programs.settle(&lambda);
+        }
+        let mut local = forces;
+        problem.gather.add_transpose(-1.0, &balanced, &mut local);
         let wanted = forcing.drop.max(EXACT);
         let norm = |x: &Torn| {
             let squares: Vec<f64> = x.iter().map(|x| dot(x, x)).collect();
@@ -311,7 +316,7 @@ impl<'a> StepSolver<'a> {
         if let Some(held) = self.programs.held() {
             let coarse = &self.projector.coarse;
             let back = timer.time("coarse problem", || motion::amplitudes(held, coarse, problem.space, &defect));
-            recover::add_rigid_motion(problem, -1.0, &back, &mut du);
+            recover::add_rigid_motion(problem, coarse, -1.0, &back, &mut du);
         }
         self.mend(problem, &slack, &mut du, timer);
         let applications = self.operator.applications() - before + refined;
@@ -417,6 +422,13 @@ impl<'a> StepSolver<'a> {
             };
         }
         agree_on(failure, problem)?;
+        let loose = timer.time("clusters", || self.operator.update_clusters()).err();
+        let loose = loose.map(|own| problem.subdomains[own].id);
+        if let Some(subdomain) = first_of_all(loose, problem) {
+            return Err(format!(
+                "the cluster of subdomain {subdomain} has no stiffness: set decomposition.cluster = 1"
+            ));
+        }
         if let Some(preconditioner) = &mut self.preconditioner {
             let diagonals: Vec<Vec<f64>> = self
                 .tangents
@@ -433,12 +445,13 @@ impl<'a> StepSolver<'a> {
 
 /// One outcome for all ranks: the lowest failing subdomain speaks; ranks that see no failure repeat its number.
 fn agree_on(failure: Option<NotDefinite>, problem: &TornProblem) -> Result<(), String> {
-    let failed = failure.as_ref().map_or(f64::NEG_INFINITY, |f| -(f.subdomain as f64));
-    let lowest = problem.space.maximum(failed);
-    if lowest == f64::NEG_INFINITY {
-        return Ok(());
-    }
-    let subdomain = -lowest as usize;
+    let Some(subdomain) = first_of_all(failure.as_ref().map(|f| f.subdomain), problem) else { return Ok(()) };
     let unknown = NotDefinite { subdomain, pivot: 0, dofs: 0 };
     Err(failure.filter(|f| f.subdomain == subdomain).unwrap_or(unknown).to_string())
+}
+
+/// The lowest number that any rank names.
+fn first_of_all(mine: Option<usize>, problem: &TornProblem) -> Option<usize> {
+    let lowest = problem.space.maximum(mine.map_or(f64::NEG_INFINITY, |number| -(number as f64)));
+    (lowest != f64::NEG_INFINITY).then_some(-lowest as usize)
 }

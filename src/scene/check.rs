@@ -8,7 +8,7 @@ use std::fmt::Debug;
 use super::Scene;
 use super::body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
 use super::contact::{Contact, Sides};
-use super::decomposition::Decomposition;
+use super::decomposition::Method;
 use super::error::Fault;
 use super::held::Held;
 use super::initial::Initial;
@@ -243,15 +243,18 @@ pub(super) fn known<'a>(section: &str, known: impl Iterator<Item = &'a String>) 
 }
 
 fn decomposition(scene: &Scene) -> Checked {
-    match scene.decomposition {
-        Decomposition::Auto => Ok(()),
-        Decomposition::Bricks { cells } => {
+    if let Some(cluster) = scene.decomposition.cluster {
+        require(cluster >= 1, "decomposition.cluster", cluster, "must be at least 1")?;
+    }
+    match scene.decomposition.method {
+        Method::Auto => Ok(()),
+        Method::Bricks { cells } => {
             let key = "decomposition.cells";
             require(!cells.contains(&0), key, cells, "must be at least 1 along each axis")?;
             scene.body.iter().try_for_each(|(name, body)| divided(name, body, cells))
         }
-        Decomposition::Metis { subdomains: None } => Ok(()),
-        Decomposition::Metis { subdomains: Some(subdomains) } => {
+        Method::Metis { subdomains: None } => Ok(()),
+        Method::Metis { subdomains: Some(subdomains) } => {
             let key = "decomposition.subdomains";
             let bodies = scene.body.len();
             require(subdomains >= bodies, key, subdomains, format!("each of the {bodies} bodies needs at least one"))?;

@@ -2,12 +2,25 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Subdomains, and clusters of them.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Section")]
+pub struct Decomposition {
+    /// How subdomains are cut.
+    #[serde(flatten)]
+    pub method: Method,
+    /// About how many neighbouring subdomains share one set of rigid motions in the coarse problem; 1 for plain Total FETI.
+    /// Absent: by their number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cluster: Option<usize>,
+}
+
 /// The method and its one parameter.
 ///
 /// In a file the method may be left out: `subdomains` selects metis, `cells` bricks, and nothing auto.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "method", rename_all = "lowercase", try_from = "Section")]
-pub enum Decomposition {
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(tag = "method", rename_all = "lowercase")]
+pub enum Method {
     /// Bricks with the paper's cells where they divide every body, else metis by the cost model.
     #[default]
     Auto,
@@ -31,14 +44,15 @@ pub const PAPER_CELLS: [usize; 3] = [10, 10, 10];
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Section {
-    method: Option<Method>,
+    method: Option<Name>,
     cells: Option<[usize; 3]>,
     subdomains: Option<usize>,
+    cluster: Option<usize>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Method {
+enum Name {
     Auto,
     Bricks,
     Metis,
@@ -60,14 +74,15 @@ impl TryFrom<Section> for Decomposition {
 
     /// `cells` beside other methods are ignored: a file can keep them while its user tries these.
     fn try_from(section: Section) -> Result<Self, SectionError> {
-        let Section { method, cells, subdomains } = section;
-        match (method, subdomains) {
-            (Some(Method::Bricks), Some(subdomains)) => Err(SectionError { subdomains, method: "bricks" }),
-            (Some(Method::Auto), Some(subdomains)) => Err(SectionError { subdomains, method: "auto" }),
-            (Some(Method::Metis), _) | (None, Some(_)) => Ok(Decomposition::Metis { subdomains }),
-            (Some(Method::Auto), None) => Ok(Decomposition::Auto),
-            (Some(Method::Bricks), None) => Ok(Decomposition::Bricks { cells: cells.unwrap_or(PAPER_CELLS) }),
-            (None, None) => Ok(cells.map_or(Decomposition::Auto, |cells| Decomposition::Bricks { cells })),
-        }
+        let Section { method, cells, subdomains, cluster } = section;
+        let method = match (method, subdomains) {
+            (Some(Name::Bricks), Some(subdomains)) => return Err(SectionError { subdomains, method: "bricks" }),
+            (Some(Name::Auto), Some(subdomains)) => return Err(SectionError { subdomains, method: "auto" }),
+            (Some(Name::Metis), _) | (None, Some(_)) => Method::Metis { subdomains },
+            (Some(Name::Auto), None) => Method::Auto,
+            (Some(Name::Bricks), None) => Method::Bricks { cells: cells.unwrap_or(PAPER_CELLS) },
+            (None, None) => cells.map_or(Method::Auto, |cells| Method::Bricks { cells }),
+        };
+        Ok(Self { method, cluster })
     }
 }

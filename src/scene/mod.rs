@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 pub use body::{Axis, Body, Brick, Element, Gmsh, Rotation, Shape};
 pub use changes::changes;
 pub use contact::{Contact, Obstacle, Sides};
-pub use decomposition::{Decomposition, PAPER_CELLS};
+pub use decomposition::{Decomposition, Method, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use held::Held;
 pub use initial::Initial;

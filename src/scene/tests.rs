@@ -79,7 +79,7 @@ fn two_blocks_is_the_benchmark() {
     assert_eq!(scene.material["upper"], scene.material["lower"]);
     assert_eq!(traction(&scene, "top"), [0.0, 0.0, -150.0]);
     assert_eq!(scene.contact["joint"].surfaces().next().unwrap().to_string(), "upper.zmin");
-    assert_eq!(scene.decomposition, Decomposition::Bricks { cells: PAPER_CELLS });
+    assert_eq!(scene.decomposition.method, Method::Bricks { cells: PAPER_CELLS });
     assert_eq!(scene.solver, Solver::default());
 }
 
@@ -102,7 +102,8 @@ fn effective_scenes_round_trip() {
         let text = scene.to_toml();
         assert_eq!(Scene::from_text(&text, "echo", 1, &[]).unwrap(), scene, "{text}");
     }
-    let metis = two_blocks(&["decomposition.subdomains=7", "solver.expansion=fixed"]).unwrap();
+    let metis =
+        two_blocks(&["decomposition.subdomains=7", "decomposition.cluster=3", "solver.expansion=fixed"]).unwrap();
     assert_eq!(Scene::from_text(&metis.to_toml(), "echo", 1, &[]).unwrap(), metis);
     let steps = two_blocks(&["step=[{load={top=0.5}, increments=3}, {name='off', amplitude=0}]"]).unwrap();
     assert_eq!(Scene::from_text(&steps.to_toml(), "echo", 1, &[]).unwrap(), steps);
@@ -112,7 +113,7 @@ fn effective_scenes_round_trip() {
 fn levels_refine_cells_but_not_subdomains() {
     let scene = Scene::load("two-blocks", 3, &[]).unwrap();
     assert_eq!(scene.body["lower"].brick().unwrap().cells, [90, 30, 30]);
-    assert_eq!(scene.decomposition, Decomposition::Bricks { cells: PAPER_CELLS });
+    assert_eq!(scene.decomposition.method, Method::Bricks { cells: PAPER_CELLS });
     assert_says(Scene::load("two-blocks", 0, &[]), &["level 0"]);
     assert_says(Scene::load("two-blocks", usize::MAX, &[]), &["body.lower.brick.cells", "too many"]);
 }
@@ -546,29 +547,31 @@ fn decompositions_are_checked() {
     assert_says(two_blocks(&["decomposition.subdomains=1"]), &["decomposition.subdomains = 1", "2 bodies"]);
     refuses(&["decomposition.subdomains=49"], &["decomposition.subdomains = 49", "48 elements"]);
     assert!(one(&["decomposition.subdomains=48"]).is_ok());
+    refuses(&["decomposition.cluster=0"], &["decomposition.cluster = 0", "at least 1"]);
+    assert_eq!(one(&["decomposition.cluster=8"]).unwrap().decomposition.cluster, Some(8));
 }
 
 #[test]
 fn the_method_follows_the_keys() {
-    let metis = |subdomains| Decomposition::Metis { subdomains: Some(subdomains) };
-    let bricks = Decomposition::Bricks { cells: PAPER_CELLS };
+    let metis = |subdomains| Method::Metis { subdomains: Some(subdomains) };
+    let bricks = Method::Bricks { cells: PAPER_CELLS };
     let cut = |text: &str, list: &[&str]| {
         let text = ONE.replace("cells = [2, 2, 2]\n", text);
-        Scene::from_text(&text, "one.toml", 5, &sets(list)).map(|scene| scene.decomposition)
+        Scene::from_text(&text, "one.toml", 5, &sets(list)).map(|scene| scene.decomposition.method)
     };
-    assert_eq!(cut("", &[]).unwrap(), Decomposition::default());
+    assert_eq!(cut("", &[]).unwrap(), Method::default());
     assert_eq!(cut("subdomains = 4", &[]).unwrap(), metis(4));
     assert_eq!(cut("method = 'metis'\ncells = [9, 9, 9]\nsubdomains = 4", &[]).unwrap(), metis(4));
     let both = cut("method = 'bricks'\nsubdomains = 4", &[]).unwrap_err().to_string();
     assert!(both.contains("line 13") && both.contains("method = \"bricks\" is given"), "{both}");
-    assert_eq!(cut("method = 'metis'", &[]).unwrap(), Decomposition::Metis { subdomains: None });
+    assert_eq!(cut("method = 'metis'", &[]).unwrap(), Method::Metis { subdomains: None });
     assert_eq!(cut("method = 'bricks'", &[]).unwrap(), bricks);
-    assert_eq!(cut("method = 'auto'", &[]).unwrap(), Decomposition::Auto);
+    assert_eq!(cut("method = 'auto'", &[]).unwrap(), Method::Auto);
     assert!(cut("method = 'auto'\nsubdomains = 4", &[]).is_err());
 
     assert_eq!(cut("method = 'bricks'", &["decomposition.subdomains=4"]).unwrap(), metis(4));
     assert_eq!(cut("subdomains = 4", &["decomposition.method=bricks"]).unwrap(), bricks);
-    assert_eq!(cut("subdomains = 4", &["decomposition.method=auto"]).unwrap(), Decomposition::Auto);
+    assert_eq!(cut("subdomains = 4", &["decomposition.method=auto"]).unwrap(), Method::Auto);
     assert!(cut("", &["decomposition.method=bricks", "decomposition.subdomains=4"]).is_err());
     let supplied = ["decomposition.subdomains=4", "decomposition.method=metis"];
     assert_eq!(cut("method = 'bricks'", &supplied).unwrap(), metis(4));

@@ -83,7 +83,13 @@ pub fn discretise_expecting(
     let touching: Vec<usize> = scene.contact.values().flat_map(scene::Contact::surfaces).map(index).collect();
 
     let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &surfaces, contact: &touching };
-    let decomposition = decomposition::tear(&torn, cut(&scene.decomposition, &bodies), yielding, comm);
+    let decomposition = decomposition::tear(
+        &torn,
+        cut(&scene.decomposition.method, &bodies),
+        scene.decomposition.cluster,
+        yielding,
+        comm,
+    );
     drop(solids);
     let reading_mb = reading_mb(&bodies, comm);
 
@@ -142,16 +148,16 @@ fn reading_mb(bodies: &[BodyMesh], comm: &dyn Comm) -> Option<f64> {
 }
 
 /// How the scene wants its bodies cut.
-pub(super) fn cut(wanted: &scene::Decomposition, bodies: &[BodyMesh]) -> Cut {
+pub(super) fn cut(wanted: &scene::Method, bodies: &[BodyMesh]) -> Cut {
     // As many nodes as the paper's boxes have.
     let degree = bodies.iter().map(|body| body.kind.degree()).max().unwrap_or(1);
     let boxes = scene::PAPER_CELLS.map(|cells| cells / degree);
     let divides = |body: &BodyMesh| body.brick().is_some_and(|b| (0..3).all(|a| b.cells[a].is_multiple_of(boxes[a])));
     match *wanted {
-        scene::Decomposition::Bricks { cells } => Cut::Bricks(cells),
-        scene::Decomposition::Auto if bodies.iter().all(divides) => Cut::Bricks(boxes),
-        scene::Decomposition::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
-        scene::Decomposition::Metis { subdomains: None } | scene::Decomposition::Auto => {
+        scene::Method::Bricks { cells } => Cut::Bricks(cells),
+        scene::Method::Auto if bodies.iter().all(divides) => Cut::Bricks(boxes),
+        scene::Method::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
+        scene::Method::Metis { subdomains: None } | scene::Method::Auto => {
             let tetrahedra = bodies.iter().map(|b| b.counts().elements * b.kind.tetrahedra()).sum();
             Cut::Metis(cost::subdomains(tetrahedra, bodies.iter().map(|body| body.materials.len()).sum()))
         }

@@ -5,7 +5,7 @@ use super::{StudyError, conditions, report};
 use crate::comm::Comm;
 use crate::feti::coarse::Coarse;
 use crate::feti::gather::Gather;
-use crate::feti::kernel::RigidModes;
+use crate::feti::kernel::{self, RigidModes};
 use crate::feti::space::RowSpace;
 use crate::newton::loading::Stage;
 use crate::newton::{equilibrium, recover};
@@ -20,8 +20,8 @@ pub fn held(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Result<(), S
     let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains[..]);
     let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
     let space = RowSpace::new(comm, shares, constraints);
-    let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
-    let mut coarse = Coarse::new(comm, shares, subdomains, &modes, constraints, &gather);
+    let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
+    let mut coarse = Coarse::new(comm, &decomposition.clusters, subdomains, &modes, constraints, &gather);
     let (_, stages) = conditions::stages(scene, discrete, &|| gather.zeros());
     at_all_stages(scene, discrete, &mut coarse, &space, &modes, &stages)
 }

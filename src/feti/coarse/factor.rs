@@ -7,19 +7,19 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use super::{Floating, MODES};
+use super::MODES;
 use crate::feti::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use crate::feti::ordering::nested_dissection;
 
-/// A 6x6 block of `G G'`, by `(row, column)` subdomain, lower triangle.
+/// A 6x6 block of `G G'`, by `(row, column)` cluster, lower triangle.
 pub type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;
 
-/// The subdomains that each one has a block with, as METIS wants it: begins and neighbours.
-fn adjacency(blocks: &Blocks, subdomains: usize) -> (Vec<i32>, Vec<i32>) {
+/// The clusters that each one has a block with, as METIS wants it: begins and neighbours.
+fn adjacency(blocks: &Blocks, clusters: usize) -> (Vec<i32>, Vec<i32>) {
     let mut pairs: Vec<(usize, usize)> =
         blocks.keys().filter(|(a, b)| a != b).flat_map(|&(a, b)| [(a, b), (b, a)]).collect();
     pairs.sort_unstable();
-    let begins = (0..=subdomains).map(|s| pairs.partition_point(|pair| pair.0 < s) as i32).collect();
+    let begins = (0..=clusters).map(|c| pairs.partition_point(|pair| pair.0 < c) as i32).collect();
     (begins, pairs.into_iter().map(|pair| pair.1 as i32).collect())
 }
 
@@ -35,9 +35,9 @@ pub struct Symbolic {
 
 impl Symbolic {
     /// For these blocks; their values do not count.
-    pub fn new(blocks: &Blocks, subdomains: usize) -> Self {
-        // A subdomain that no row touches has a block of zeros.
-        let mut places: Vec<(usize, usize)> = (0..subdomains).map(|s| (s, s)).collect();
+    pub fn new(blocks: &Blocks, clusters: usize) -> Self {
+        // A cluster that no row touches has a block of zeros.
+        let mut places: Vec<(usize, usize)> = (0..clusters).map(|c| (c, c)).collect();
         places.extend(blocks.keys().map(|&(row, column)| (column, row)));
         places.sort_unstable();
         places.dedup();
@@ -51,7 +51,7 @@ impl Symbolic {
                 begins.push(rows.len() as u32);
             }
         }
-        let order = nested_dissection(&adjacency(blocks, subdomains), MODES as u32);
+        let order = nested_dissection(&adjacency(blocks, clusters), MODES as u32);
         let cholesky = Analysis::ordered(Lower { column_begin: &begins, rows: &rows }, &order);
         Self { places, begins, rows, cholesky }
     }
@@ -89,15 +89,13 @@ impl CoarseFactor {
     /// Of these blocks, for which `symbolic` has to have places.
     ///
     /// # Errors
-    /// If they are singular.
-    pub fn new(symbolic: &Rc<Symbolic>, blocks: &Blocks) -> Result<Self, Floating> {
+    /// If they are singular, the cluster where that shows.
+    pub fn new(symbolic: &Rc<Symbolic>, blocks: &Blocks) -> Result<Self, usize> {
         let Symbolic { begins, rows, cholesky, .. } = &**symbolic;
         let (lower, values) = (Lower { column_begin: begins, rows }, symbolic.values(blocks));
         let mut workspace = Workspace::new([cholesky]);
         let mut factor = Factor::new(cholesky, Precision::Double);
-        workspace
-            .factorise(cholesky, lower, &values, &mut factor)
-            .map_err(|breakdown| Floating { subdomain: breakdown.unknown / MODES })?;
+        workspace.factorise(cholesky, lower, &values, &mut factor).map_err(|breakdown| breakdown.unknown / MODES)?;
         let result = Self { symbolic: Rc::clone(symbolic), factor, workspace: RefCell::new(workspace) };
         // Round-off can hide a free motion: the factor then answers far beyond the size of the matrix.
         let largest = values.iter().copied().fold(0.0, f64::max);
@@ -105,14 +103,14 @@ impl CoarseFactor {
     }
 
     /// Inverse iteration from a fixed vector without a pattern: a free motion shows as a huge response.
-    fn check_rank(&self, n: usize, largest: f64) -> Result<(), Floating> {
+    fn check_rank(&self, n: usize, largest: f64) -> Result<(), usize> {
         let sound = |response: f64| response.abs() * largest < (n as f64).sqrt() / SINGULAR;
-        // Multiples of an irrational number: no motion of a few subdomains is orthogonal to them.
+        // Multiples of an irrational number: no motion of a few clusters is orthogonal to them.
         let mut x: Vec<f64> = (1..=n).map(|k| (k as f64 * std::f64::consts::SQRT_2).fract() - 0.5).collect();
         self.solve(&mut x);
         let worst = x.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         match worst {
-            Some((at, response)) if !sound(*response) => Err(Floating { subdomain: at / MODES }),
+            Some((at, response)) if !sound(*response) => Err(at / MODES),
             _ => Ok(()),
         }
     }
@@ -122,7 +120,7 @@ impl CoarseFactor {
         self.symbolic.cholesky.factor_length()
     }
 
-    /// `a = (G G')^-1 a`, six numbers a subdomain. Local.
+    /// `a = (G G')^-1 a`, six numbers a cluster. Local.
     pub fn solve(&self, a: &mut [f64]) {
         self.workspace.borrow_mut().solve(&self.symbolic.cholesky, &self.factor, a);
     }

@@ -5,7 +5,6 @@ use super::{Preconditioner, boundaries};
 use crate::constraint::Kind;
 use crate::feti::cholesky::Precision;
 use crate::feti::factor::{Factors, analyse};
-use crate::feti::operator::DualOperator;
 use crate::feti::scaling::Scaling;
 use crate::feti::schur::Schur;
 use crate::fixture::{
@@ -210,7 +209,7 @@ fn dirichlet_conditions_the_dual_operator_better_than_lumped_and_lumped_better_t
         let basis = (setup.dense_rows() * setup.dense_modes()).qr().compute_thin_Q();
         let p = Mat::<f64>::identity(n, n) - &basis * basis.transpose();
         let unit = |k: usize| (0..n).map(|i| f64::from(u8::from(i == k))).collect::<Vec<_>>();
-        let mut operator = DualOperator::new(setup.factors().0, &setup.gather);
+        let mut operator = setup.operator();
         let mut f = Mat::zeros(n, n);
         for k in 0..n {
             let mut image = vec![0.0; n];
