@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn gluing_does_not_act_on_bodies_and_contact_acts_on_two_alike() {
-        for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+        for scene in [two_bricks(&[]), two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7)] {
             on_ranks(&scene, 2, |setup| {
                 let coarse = setup.bare_coarse();
                 for (row, of) in setup.rows().iter().enumerate() {

@@ -46,6 +46,10 @@ pub struct Coarse<'a> {
     slot_modes: Vec<[f64; MODES]>,
     /// For each own cluster, its (row, slot) in row order.
     own_slots: Vec<Vec<(u32, u32)>>,
+    /// Whether an inequality acts on it.
+    bounded: Vec<bool>,
+    /// Block rows of the others.
+    constant: OnceCell<Blocks>,
     motions: BodyMotions,
     /// For all rows, and so for any.
     symbolic: OnceCell<Rc<Symbolic>>,
@@ -66,7 +70,7 @@ impl<'a> Coarse<'a> {
     ) -> Self {
         let first = clusters.shares.begin(comm.rank());
         let members: Vec<Range<usize>> = clusters.of_rank(comm.rank()).collect();
-        let mut own_slots = vec![Vec::new(); members.len()];
+        let (mut own_slots, mut bounded) = (vec![Vec::new(); members.len()], vec![false; members.len()]);
         let (mut slot_begin, mut slot_cluster, mut slot_modes) = (vec![0], Vec::new(), Vec::new());
         gather.exchange(
             MODES,
@@ -96,8 +100,9 @@ impl<'a> Coarse<'a> {
                     slot_modes.truncate(begin);
                 }
                 for (slot, &cluster) in (begin..).zip(&slot_cluster[begin..]) {
-                    if let Some(slots) = (cluster as usize).checked_sub(first).and_then(|own| own_slots.get_mut(own)) {
-                        slots.push((row as u32, slot as u32));
+                    if let Some(own) = (cluster as usize).checked_sub(first).filter(|&own| own < own_slots.len()) {
+                        own_slots[own].push((row as u32, slot as u32));
+                        bounded[own] |= constraints.rows[row].is_inequality();
                     }
                 }
                 slot_begin.push(slot_cluster.len() as u32);
@@ -112,6 +117,8 @@ impl<'a> Coarse<'a> {
             slot_cluster,
             slot_modes,
             own_slots,
+            bounded,
+            constant: OnceCell::new(),
             symbolic: OnceCell::new(),
             factor: None,
         }
@@ -147,7 +154,8 @@ impl<'a> Coarse<'a> {
         CoarseFactor::new(fitting, blocks).map_err(|cluster| Floating { subdomain: self.clusters.first(cluster) })
     }
 
-    /// The blocks of `G G'` of the kept rows, lower triangle, on every rank. Collective.
+    /// The blocks of `G G'` of the kept rows, which are all equalities and some inequalities; lower triangle, on every rank.
+    /// Collective.
     pub fn blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
         share_blocks(self.comm, &self.own_blocks(kept))
     }
@@ -176,25 +184,42 @@ impl<'a> Coarse<'a> {
     /// Block rows of `G G'` that belong to own clusters, lower triangle. Complete: every row that a subdomain takes
     /// part in is on its rank.
     fn own_blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
+        let constant = || self.block_rows(|own| !self.bounded[own], |_| true).collect();
+        let mut blocks: Blocks = self.constant.get_or_init(constant).clone();
+        blocks.extend(self.block_rows(|own| self.bounded[own], kept));
+        blocks
+    }
+
+    /// Block rows of some own clusters.
+    fn block_rows(
+        &self,
+        of: impl Fn(usize) -> bool,
+        kept: impl Fn(usize) -> bool,
+    ) -> impl Iterator<Item = ((usize, usize), [f64; MODES * MODES])> {
         let first = self.clusters.shares.begin(self.comm.rank());
-        let mut blocks = Blocks::new();
-        for (own, slots) in self.own_slots.iter().enumerate() {
-            for &(row, slot) in slots.iter().filter(|(row, _)| kept(*row as usize)) {
+        (0..self.members.len()).filter(move |&own| of(own)).flat_map(move |own| {
+            // A cluster has few neighbours.
+            let (mut columns, mut blocks): (Vec<u32>, Vec<[f64; MODES * MODES]>) = Default::default();
+            for &(row, slot) in self.own_slots[own].iter().filter(|(row, _)| kept(*row as usize)) {
                 for other in self.slots(row as usize) {
-                    let column = self.slot_cluster[other] as usize;
-                    if column > first + own {
+                    let column = self.slot_cluster[other];
+                    if column as usize > first + own {
                         continue;
                     }
-                    let block = blocks.entry((first + own, column)).or_insert([0.0; MODES * MODES]);
-                    for (i, a) in self.slot_modes[slot as usize].iter().enumerate() {
-                        for (j, b) in self.slot_modes[other].iter().enumerate() {
-                            block[MODES * i + j] += a * b;
-                        }
+                    let at = columns.iter().position(|c| *c == column).unwrap_or_else(|| {
+                        blocks.push([0.0; MODES * MODES]);
+                        columns.push(column);
+                        columns.len() - 1
+                    });
+                    for (a, products) in
+                        self.slot_modes[slot as usize].iter().zip(blocks[at].as_chunks_mut::<MODES>().0)
+                    {
+                        products.iter_mut().zip(&self.slot_modes[other]).for_each(|(p, b)| *p += a * b);
                     }
                 }
             }
-        }
-        blocks
+            columns.into_iter().map(move |column| (first + own, column as usize)).zip(blocks)
+        })
     }
 
     fn slots(&self, row: usize) -> std::ops::Range<usize> {

@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn knows_the_balance_of_the_kept_rows() {
-        for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+        for scene in [two_bricks(&[]), two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7)] {
             on_ranks(&scene, 1, |setup| {
                 let (coarse, kept) = (setup.coarse().expect("the bodies are held"), some(setup));
                 assert!(kept.contains(&false));

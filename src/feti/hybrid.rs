@@ -124,6 +124,13 @@ impl Cluster {
     }
 }
 
+/// Numbers that a cluster of these members takes, if it shares nothing.
+pub fn numbers(members: &[Subdomain]) -> usize {
+    let bonds = Bonds::of_faces(members);
+    let responses = bonds.members.iter().map(|member| member.jumps.len() * member.modes.len()).sum::<usize>();
+    responses + bonds.rows.pow(2) + (MODES * members.len()).pow(2)
+}
+
 /// `K^+ B_c'` of a member, by columns.
 fn response_of(factors: &mut Factors, bonds: &Bonds, member: usize, own: usize) -> Vec<f64> {
     let bonds::Member { modes, jumps } = &bonds.members[member];

@@ -168,7 +168,8 @@ mod tests {
 
     #[test]
     fn images_are_the_same_bits_on_any_ranks() {
-        for scene in [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[])] {
+        let clusters = built_in("patch", &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=8"]);
+        for scene in [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[]), clusters] {
             same_on_any_ranks(&scene, |setup| {
                 let mut image = vec![0.0; setup.rows().len()];
                 setup.operator().apply(&setup.multipliers(7), &mut image);

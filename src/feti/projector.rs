@@ -50,8 +50,8 @@ mod tests {
     use crate::fixture::{Setup, on_ranks, two_bricks, two_bricks_by_metis};
     use crate::scene::Scene;
 
-    fn scenes() -> [Scene; 2] {
-        [two_bricks(&[]), two_bricks_by_metis(7)]
+    fn scenes() -> [Scene; 3] {
+        [two_bricks(&[]), two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7)]
     }
 
     fn projector<'a>(setup: &Setup<'a>) -> Projector<'a> {

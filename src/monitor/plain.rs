@@ -57,9 +57,12 @@ fn size_lines(scene: &str, level: usize, ranks: usize, sizes: &Sizes) -> Vec<Str
     let line = |what: &str, count: u64, detail: String| format!("  {what:<16}{count:>12}{detail}");
     let (glue, supports, contact) = (sizes.gluing_rows, sizes.dirichlet_rows, sizes.contact_rows);
     let mut share = match ranks {
-        1 => "  on 1 rank".to_owned(),
-        _ => format!("  on {ranks} ranks"),
+        1 => "on 1 rank".to_owned(),
+        _ => format!("on {ranks} ranks"),
     };
+    if sizes.clusters < sizes.subdomains {
+        share = format!("in {} clusters {share}", sizes.clusters);
+    }
     if contact > 0 {
         share += &format!(", {} at contact surfaces", sizes.contact_subdomains);
     }
@@ -67,7 +70,7 @@ fn size_lines(scene: &str, level: usize, ranks: usize, sizes: &Sizes) -> Vec<Str
         format!("{scene}, level {level}"),
         line("nodes", sizes.nodes, String::new()),
         line("elements", sizes.elements, format!("  in {} cells", sizes.cells)),
-        line("subdomains", sizes.subdomains, share),
+        line("subdomains", sizes.subdomains, format!("  {share}")),
         line("primal unknowns", sizes.primal_dofs, String::new()),
         line("dual unknowns", sizes.dual_dofs, format!("  {glue} gluing + {supports} support + {contact} contact")),
     ]

@@ -72,6 +72,44 @@ fn ranks_change_no_bit() {
     }
 }
 
+/// Eight boxes a body, in clusters of about so many.
+fn clustered(cluster: usize, sets: &[&str]) -> Scene {
+    let cells = ["body.lower.brick.cells=[8, 4, 2]", "body.upper.brick.cells=[8, 4, 2]"];
+    plastic(&[&cells, &[&format!("decomposition.cluster={cluster}")[..]], sets].concat())
+}
+
+#[test]
+fn clusters_lead_to_the_solution_of_single_subdomains() {
+    for method in METHODS {
+        let exact = [&method[..], &["solver.qp_tolerance=1e-11", "solver.residual_tolerance=1e-10"]].concat();
+        let [single, hybrid] = [1, 4].map(|cluster| solve(&clustered(cluster, &exact), 2).0);
+        assert_eq!((single.sizes.clusters, hybrid.sizes.clusters), (16, 4));
+        assert_eq!(single.sizes.dual_dofs, hybrid.sizes.dual_dofs);
+        for summary in [&single, &hybrid] {
+            assert_eq!(summary.converged, Some(true), "{method:?}: {:?}", summary.error);
+        }
+        let [one, other] = [&single.state, &hybrid.state];
+        assert!((other.energy.unwrap() / one.energy.unwrap() - 1.0).abs() < 1e-10, "{method:?}");
+        assert_eq!(other.plastic_elements, one.plastic_elements);
+        assert_eq!(other.active_contacts, one.active_contacts);
+        assert!(one.plastic_elements > Some(10) && one.active_contacts > Some(1));
+    }
+}
+
+#[test]
+fn clusters_change_no_bit_on_any_ranks_and_none_when_stopped() {
+    for method in [METHODS[0], METHODS[4]] {
+        let scene = clustered(4, &method);
+        let (alone, displacements) = solve(&scene, 1);
+        for ranks in [2, 3, 5] {
+            let (summary, others) = solve(&scene, ranks);
+            assert_eq!(others, displacements, "{method:?} on {ranks} ranks");
+            assert_eq!((summary.counters.clone(), energies(&summary)), (alone.counters.clone(), energies(&alone)));
+        }
+        stopped_anywhere_it_arrives_at_the_same_bits(&scene, 2);
+    }
+}
+
 #[test]
 fn the_energy_falls_in_every_step_and_the_end_is_quadratic() {
     let scene = plastic(&[&METHODS[4][..], &["solver.qp_tolerance=1e-13", "solver.residual_tolerance=1e-11"]].concat());

@@ -174,6 +174,8 @@ pub struct Sizes {
     pub elements: u64,
     /// Subdomains.
     pub subdomains: u64,
+    /// Clusters of them that have six rigid motions in the coarse problem: as many where each has its own.
+    pub clusters: u64,
     /// Those with a triangle on a contact surface.
     pub contact_subdomains: u64,
     /// Displacements of the torn problem.

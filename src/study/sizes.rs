@@ -4,6 +4,7 @@ use super::discrete::Discrete;
 use crate::comm::{Comm, Shares, ordered_sum};
 use crate::constraint::Kind;
 use crate::feti::factor::analyse;
+use crate::feti::hybrid;
 use crate::feti::space::RowSpace;
 use crate::results::summary::Sizes;
 use crate::scene::{self, Scene};
@@ -31,6 +32,7 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
         cells: bodies.iter().map(|b| b.counts().cells).sum(),
         elements: bodies.iter().map(|b| b.counts().elements).sum(),
         subdomains: decomposition.shares.total() as u64,
+        clusters: decomposition.clusters.total() as u64,
         contact_subdomains: sum[4],
         primal_dofs: sum[0],
         gluing_rows: sum[1],
@@ -57,9 +59,11 @@ pub fn memory_estimate_mb(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -
                 + 12.0 * s.pattern.dofs() as f64
         })
         .sum();
+    let clusters = decomposition.clusters.of_rank(comm.rank()).filter(|members| members.len() > 1);
+    let bonds: f64 = clusters.map(|members| hybrid::numbers(&decomposition.subdomains[members]) as f64).sum();
     // A row of G' and a row's terms; the coarse factor is small beside them.
     let slots = 12.0 * constraints.slot_subdomain.len() as f64;
-    let mine = 8.0 * (doubles + slots) / f64::from(1 << 20);
+    let mine = 8.0 * (doubles + bonds + slots) / f64::from(1 << 20);
     ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0] + PROCESS_MB * comm.size() as f64
 }
 

@@ -10,8 +10,13 @@ use crate::fixture::{
 use crate::random::Random;
 use crate::scene::Scene;
 
-fn scenes() -> [Scene; 3] {
-    [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[])]
+fn scenes() -> [Scene; 4] {
+    [two_bricks(&[]), two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7), clusters()]
+}
+
+/// Four clusters of eight subdomains a body.
+fn clusters() -> Scene {
+    built_in("patch", &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=8"])
 }
 
 /// `G = R'B'`.
@@ -46,7 +51,7 @@ fn products_and_solutions_are_those_of_the_dense_matrices() {
 
 #[test]
 fn a_restricted_coarse_problem_knows_the_kept_rows_only() {
-    for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+    for scene in [two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7)] {
         on_ranks(&scene, 1, |setup| {
             let (mut g, coarse) = (dense_coarse(setup), setup.coarse().expect("the bodies are held"));
             let kept: Vec<bool> = setup.rows().iter().map(|row| !row.is_inequality()).collect();
@@ -63,7 +68,7 @@ fn a_restricted_coarse_problem_knows_the_kept_rows_only() {
 
 #[test]
 fn coarse_products_and_solutions_are_the_same_bits_on_any_ranks() {
-    for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+    for scene in [clusters(), two_bricks_by_metis(7)] {
         for solved in [false, true] {
             same_on_any_ranks(&scene, |setup| {
                 let coarse = setup.coarse().expect("the bodies are held");
@@ -71,8 +76,8 @@ fn coarse_products_and_solutions_are_the_same_bits_on_any_ranks() {
                 if solved {
                     coarse.solve(&mut a);
                 }
-                let first = MODES * setup.discrete.decomposition.shares.begin(setup.comm.rank());
-                a[first..][..MODES * setup.subdomains().len()].to_vec()
+                let shares = &setup.discrete.decomposition.clusters.shares;
+                a[MODES * shares.begin(setup.comm.rank())..][..MODES * shares.0[setup.comm.rank()]].to_vec()
             });
         }
         same_on_any_ranks(&scene, |setup| {

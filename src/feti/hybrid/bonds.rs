@@ -70,7 +70,7 @@ impl Kinds {
 
 impl Bonds {
     /// All rows.
-    fn of_faces(subdomains: &[Subdomain]) -> Self {
+    pub(super) fn of_faces(subdomains: &[Subdomain]) -> Self {
         let modes = |s: &Subdomain| {
             let modes = RigidModes::new(&s.shape);
             s.shape.iter().flat_map(|&point| modes.at(point)).collect()

@@ -63,6 +63,7 @@ fn cases() -> Vec<Case> {
         ),
         ("no contact", Box::new(|more| sets(two_bricks, &[&GLUED, more]))),
         ("plastic, contact", Box::new(|more| sets(two_bricks, &[&PLASTIC, more]))),
+        ("clusters", Box::new(|more| sets(two_bricks, &[&PLASTIC, &["decomposition.cluster=2"], more]))),
         ("kinematic, contact", Box::new(|more| sets(two_bricks, &[&PLASTIC, &KINEMATIC, more]))),
         ("plastic, mortar", Box::new(|more| sets(not_matching, &[&PLASTIC, more]))),
         (
