@@ -53,7 +53,7 @@ impl Constraints {
             let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
             for interface in cluster.nodes.iter().filter_map(|&number| node(number)) {
                 let fixed = dirichlet::fixed(interface, supports);
-                rows.extend(gluing::rows(interface, stiffness));
+                rows.extend(gluing::rows(interface, &decomposition.clusters, stiffness));
                 rows.extend(dirichlet::rows(interface, &fixed));
                 sides.insert(interface.node, (interface, fixed));
             }

@@ -1,26 +1,73 @@
 //! Gluing rows: the copies of a node move together.
 //!
-//! Per component the rows are an orthonormal basis of the complement of the constant over the `m` copies (Helmert's):
-//! row `k = 1..m-1` compares copy `k` with the mean of those before it, which are as stiff or stiffer.
+//! Per component the rows are an orthonormal basis of the complement of the constant over the copies (Helmert's): row `k`
+//! compares copy `k` with the mean of those before it. Copies in one cluster are compared among themselves, and the mean of each
+//! cluster with that of the clusters before it: only these rows move whole clusters against each other. The stiffest come first.
 
 use super::{Kind, Row, Term};
-use crate::decomposition::InterfaceNode;
+use crate::decomposition::{Clusters, InterfaceNode};
 
-/// The `3 (m - 1)` gluing rows of a node, given the stiffness of all subdomains.
-pub(super) fn rows(node: &InterfaceNode, stiffness: &[f64]) -> Vec<Row> {
+/// The `3 (m - 1)` gluing rows of a node with `m` copies, given the stiffness of all subdomains.
+pub(super) fn rows(node: &InterfaceNode, clusters: &Clusters, stiffness: &[f64]) -> Vec<Row> {
     let mut copies = node.copies.clone();
     copies.sort_by(|&a, &b| stiffness[b as usize].total_cmp(&stiffness[a as usize]));
+    let of = |copy: u32| clusters.of(copy as usize);
+    let stiffest: Vec<usize> = copies.iter().map(|&copy| of(copy)).collect();
+    copies.sort_by_key(|&copy| stiffest.iter().position(|&cluster| cluster == of(copy)));
     let mut rows = Vec::new();
     for axis in 0..3 {
-        for k in 1..copies.len() {
-            let before = 1.0 / ((k * (k + 1)) as f64).sqrt();
-            let terms = copies[..=k].iter().enumerate().map(|(copy, &subdomain)| {
-                let value = if copy < k { before } else { -(k as f64) * before };
-                Term { subdomain, node: node.node, axis, value }
-            });
-            let (terms, held) = (terms.collect(), Vec::new());
-            rows.push(Row { kind: Kind::Gluing, rhs: 0.0, scale: before, length: 1.0, terms, held });
+        let mut before = 0;
+        for group in copies.chunk_by(|&a, &b| of(a) == of(b)) {
+            let end = before + group.len();
+            if before > 0 {
+                rows.push(compare(node.node, axis, &copies[..before], &copies[before..end]));
+            }
+            rows.extend((1..group.len()).map(|k| compare(node.node, axis, &group[..k], &group[k..k + 1])));
+            before = end;
         }
     }
     rows
+}
+
+/// The mean of some copies against that of others.
+fn compare(node: u64, axis: usize, first: &[u32], second: &[u32]) -> Row {
+    let (p, q) = (first.len(), second.len());
+    let unit = 1.0 / ((p * q * (p + q)) as f64).sqrt();
+    let before = first.iter().map(|&subdomain| Term { subdomain, node, axis, value: q as f64 * unit });
+    let behind = second.iter().map(|&subdomain| Term { subdomain, node, axis, value: -(p as f64) * unit });
+    let terms = before.chain(behind).collect();
+    Row { kind: Kind::Gluing, rhs: 0.0, scale: q as f64 * unit, length: 1.0, terms, held: Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::Shares;
+
+    #[test]
+    fn rows_are_orthonormal_and_few_of_them_leave_a_cluster() {
+        let node = InterfaceNode { node: 7, copies: vec![0, 1, 2, 5, 6, 8], surfaces: Vec::new() };
+        let (clusters, _) = Clusters::new(Shares(vec![3]), &[3, 4, 2]);
+        for (clusters, leaving) in [(Clusters::singles(&Shares(vec![9])), 15), (clusters, 6)] {
+            let rows = rows(&node, &clusters, &[1.0, 4.0, 1.0, 1.0, 1.0, 2.0, 8.0, 1.0, 1.0]);
+            assert_eq!(rows.len(), 15);
+            for (i, a) in rows.iter().enumerate() {
+                assert!(a.terms.iter().map(|t| t.value).sum::<f64>().abs() < 1e-15);
+                for (j, b) in rows.iter().enumerate() {
+                    let same = |a: &Term, b: &Term| (a.subdomain, a.axis) == (b.subdomain, b.axis);
+                    let products = a
+                        .terms
+                        .iter()
+                        .flat_map(|s| b.terms.iter().filter(move |t| same(s, t)).map(move |t| s.value * t.value));
+                    assert!((products.sum::<f64>() - f64::from(i == j)).abs() < 1e-15);
+                }
+            }
+            let leaves = |row: &&Row| {
+                row.terms
+                    .windows(2)
+                    .any(|t| clusters.of(t[0].subdomain as usize) != clusters.of(t[1].subdomain as usize))
+            };
+            assert_eq!(rows.iter().filter(leaves).count(), leaving);
+        }
+    }
 }

@@ -2,12 +2,10 @@
 //!
 //! A part that falls into pieces, or hangs together by an edge or a vertex only, has more than six rigid body modes.
 
-use crate::mesh::faces::Neighbours;
-
-/// Splits every part into its face-connected pieces. `parts[e]` is the part of element `e`. Pieces are numbered
-/// consecutively in the order of their parts (empty parts vanish), within a part by first element. Returns the number of
-/// pieces.
-pub fn split_into_pieces(parts: &mut [i32], neighbours: &Neighbours) -> usize {
+/// Splits every part into its connected pieces. `parts[e]` is the part of element `e`, `neighbours(e)` are those that share a
+/// face with it. Pieces are numbered consecutively in the order of their parts (empty parts vanish), within a part by first
+/// element. Returns the number of pieces.
+pub fn split_into_pieces<I: Iterator<Item = u32>>(parts: &mut [i32], neighbours: impl Fn(usize) -> I) -> usize {
     let mut pieces = vec![usize::MAX; parts.len()];
     let mut part_of_piece = Vec::new();
     let mut stack = Vec::new();
@@ -20,7 +18,7 @@ pub fn split_into_pieces(parts: &mut [i32], neighbours: &Neighbours) -> usize {
         pieces[seed] = piece;
         stack.push(seed);
         while let Some(element) = stack.pop() {
-            for other in neighbours.of(element).map(|o| o as usize) {
+            for other in neighbours(element).map(|o| o as usize) {
                 if pieces[other] == usize::MAX && parts[other] == parts[element] {
                     pieces[other] = piece;
                     stack.push(other);
@@ -45,13 +43,15 @@ mod tests {
     use super::*;
     use crate::element::Kind;
     use crate::mesh::Elements;
+    use crate::mesh::faces::Neighbours;
 
     #[test]
     fn a_part_in_two_pieces_becomes_two_and_empty_parts_vanish() {
         // A chain of five elements; part 0 holds both ends, part 2 is empty.
         let elements = Elements::new(Kind::Tet4, (0..5).flat_map(|k| k..k + 4).collect());
         let mut parts = [0, 1, 1, 3, 0];
-        assert_eq!(split_into_pieces(&mut parts, &Neighbours::new(8, &elements)), 4);
+        let neighbours = Neighbours::new(8, &elements);
+        assert_eq!(split_into_pieces(&mut parts, |e| neighbours.of(e)), 4);
         assert_eq!(parts, [0, 2, 2, 3, 1]);
     }
 }

@@ -217,8 +217,7 @@ pub fn tear(
             (clusters, shares, ids.zip(lists).map(of_brick).collect())
         }
         Cut::Metis(parts) => {
-            let (shares, subdomains) = metis::own_subdomains(bodies, parts, comm);
-            (Clusters::singles(&shares), shares, subdomains)
+            metis::own_subdomains(bodies, parts, cluster.unwrap_or_else(|| cost::cluster(parts)), comm)
         }
     };
     let interface = interface::share(comm, &subdomains);

@@ -314,3 +314,36 @@ fn boxes_that_yield_are_spread_over_the_ranks() {
         }
     }
 }
+
+#[test]
+fn clusters_hang_together_and_are_the_same_on_any_ranks() {
+    let bricks = ["body.lower.brick.cells=[12, 4, 4]", "decomposition.cluster=8"];
+    let metis = ["decomposition.subdomains=24", "decomposition.cluster=4"];
+    for (scene, wanted) in [(two_bricks(&bricks), 4), (two_bricks(&metis), 6)] {
+        let clusters = |ranks: usize| -> Vec<Vec<Subdomain>> {
+            let of_rank = |setup: &Setup| {
+                let clusters = setup.discrete.decomposition.clusters.of_rank(setup.comm.rank());
+                clusters.map(|members| setup.subdomains()[members].to_vec()).collect::<Vec<_>>()
+            };
+            on_ranks(&scene, ranks, of_rank).concat()
+        };
+        let alone = clusters(1);
+        assert_eq!(alone.len(), wanted, "{:?}", scene.decomposition);
+        for members in &alone {
+            assert!(members.iter().all(|s| s.body == members[0].body));
+            // From the first by nodes that do not lie on an edge.
+            let mut reached = vec![0];
+            for at in 0..members.len() {
+                let Some(&from) = reached.get(at) else { panic!("{} of {} members", reached.len(), members.len()) };
+                let nodes: BTreeSet<u64> = members[from].nodes.iter().copied().collect();
+                let shared = |to: usize| members[to].nodes.iter().filter(|node| nodes.contains(node)).count();
+                let next = (0..members.len()).filter(|to| !reached.contains(to) && shared(*to) > 3);
+                let next: Vec<usize> = next.collect();
+                reached.extend(next);
+            }
+        }
+        for ranks in RANKS {
+            assert!(clusters(ranks) == alone, "{ranks} ranks");
+        }
+    }
+}

@@ -44,6 +44,8 @@ pub struct Coarse<'a> {
     slot_begin: Vec<u32>,
     slot_cluster: Vec<u32>,
     slot_modes: Vec<[f64; MODES]>,
+    /// Rows with slots.
+    moving: Vec<u32>,
     /// For each own cluster, its (row, slot) in row order.
     own_slots: Vec<Vec<(u32, u32)>>,
     /// Whether an inequality acts on it.
@@ -71,6 +73,7 @@ impl<'a> Coarse<'a> {
         let first = clusters.shares.begin(comm.rank());
         let members: Vec<Range<usize>> = clusters.of_rank(comm.rank()).collect();
         let (mut own_slots, mut bounded) = (vec![Vec::new(); members.len()], vec![false; members.len()]);
+        let mut moving = Vec::new();
         let (mut slot_begin, mut slot_cluster, mut slot_modes) = (vec![0], Vec::new(), Vec::new());
         gather.exchange(
             MODES,
@@ -105,6 +108,9 @@ impl<'a> Coarse<'a> {
                         bounded[own] |= constraints.rows[row].is_inequality();
                     }
                 }
+                if slot_cluster.len() > begin {
+                    moving.push(row as u32);
+                }
                 slot_begin.push(slot_cluster.len() as u32);
             },
         );
@@ -116,6 +122,7 @@ impl<'a> Coarse<'a> {
             slot_begin,
             slot_cluster,
             slot_modes,
+            moving,
             own_slots,
             bounded,
             constant: OnceCell::new(),
@@ -305,13 +312,13 @@ impl<'a> Coarse<'a> {
 
     /// `rows += factor G' a`. Local.
     pub fn add_transpose(&self, factor: f64, a: &[f64], rows: &mut [f64]) {
-        for (row, x) in rows.iter_mut().enumerate() {
+        for &row in &self.moving {
             let mut sum = 0.0;
-            for slot in self.slots(row) {
+            for slot in self.slots(row as usize) {
                 let at = MODES * self.slot_cluster[slot] as usize;
                 sum += self.slot_modes[slot].iter().zip(&a[at..at + MODES]).map(|(g, a)| g * a).sum::<f64>();
             }
-            *x += factor * sum;
+            rows[row as usize] += factor * sum;
         }
     }
 }

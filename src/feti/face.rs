@@ -15,6 +15,8 @@ use super::space::RowSpace;
 /// The kept rows with their factor.
 pub struct CoarseFace {
     kept: Vec<bool>,
+    /// Rows that are not.
+    dropped: Vec<u32>,
     factor: CoarseFactor,
     /// `N`, six numbers a cluster.
     free: Vec<Vec<f64>>,
@@ -39,7 +41,10 @@ impl CoarseFace {
                 tie(motions, &free, &mut blocks);
                 coarse.factor_of(&blocks).map(|factor| (factor, free))
             })
-            .map(|(factor, free)| Self { kept, factor, free })
+            .map(|(factor, free)| {
+                let dropped = (0..).zip(&kept).filter(|(_, kept)| !**kept).map(|(row, _)| row).collect();
+                Self { kept, dropped, factor, free }
+            })
     }
 
     /// Rigid motions of whole bodies that the kept rows leave free, six numbers a cluster.
@@ -70,7 +75,7 @@ impl CoarseFace {
 
     /// Sets the other rows to zero.
     pub fn mask(&self, rows: &mut [f64]) {
-        rows.iter_mut().zip(&self.kept).filter(|(_, kept)| !**kept).for_each(|(r, _)| *r = 0.0);
+        self.dropped.iter().for_each(|&row| rows[row as usize] = 0.0);
     }
 
     /// The amplitudes `a` that make `rows - G'a` smallest on the kept rows. One all-gather.

@@ -84,7 +84,6 @@ impl<'a> DualOperator<'a> {
 mod tests {
     use faer::{Mat, Side};
 
-    use super::*;
     use crate::fixture::{
         Setup, assert_close, block_diagonal, built_in, column, dense, on_ranks, same_on_any_ranks, two_bricks,
         two_bricks_by_metis,

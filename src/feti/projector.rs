@@ -77,7 +77,8 @@ mod tests {
                     let mut twice = px.clone();
                     projector.project(&mut twice);
                     let error: Vec<f64> = twice.iter().zip(&px).map(|(a, b)| a - b).collect();
-                    assert!(norm(&error) < 1e-12 * norm(&px));
+                    let left = norm(&error) / norm(&px);
+                    assert!(left < 1e-12, "{left:e}");
 
                     let products = setup.space.dots(&[(&px, &y), (&x, &py), (&px, &py)]);
                     let size = setup.space.dots(&[(&x, &x)])[0];

@@ -6,10 +6,12 @@ use crate::feti::factor::Factors;
 use crate::fixture::{Setup, assert_close, block_diagonal, column, dense, on_ranks, same_on_any_ranks, two_bricks};
 use crate::scene::Scene;
 
-/// A pair, and blocks of four in a body of two rows.
-fn scenes() -> [Scene; 2] {
+/// A pair, blocks of four in a body of two rows, and parts by METIS.
+fn scenes() -> [Scene; 3] {
     let long = ["body.lower.brick.cells=[12, 4, 2]", "body.lower.brick.size=[12.0, 4.4, 2.0]"];
-    [two_bricks(&["decomposition.cluster=2"]), two_bricks(&[&long[..], &["decomposition.cluster=4"]].concat())]
+    let by_metis = ["decomposition.subdomains=12", "decomposition.cluster=3"];
+    let blocks = [&long[..], &["decomposition.cluster=4"]].concat();
+    [&["decomposition.cluster=2"][..], &blocks, &by_metis].map(two_bricks)
 }
 
 fn hybrid(setup: &Setup) -> (Hybrid, Factors, Vec<Vec<f64>>) {
@@ -105,11 +107,12 @@ fn forces_between_members_balance_each_of_them() {
 
 #[test]
 fn solutions_are_the_same_bits_on_any_ranks() {
-    let [_, long] = scenes();
-    same_on_any_ranks(&long, |setup| {
-        let (mut hybrid, mut factors, _) = hybrid(setup);
-        let mut x = setup.displacements(2);
-        hybrid.solve(&mut factors, &mut x);
-        x.concat()
-    });
+    for scene in scenes() {
+        same_on_any_ranks(&scene, |setup| {
+            let (mut hybrid, mut factors, _) = hybrid(setup);
+            let mut x = setup.displacements(2);
+            hybrid.solve(&mut factors, &mut x);
+            x.concat()
+        });
+    }
 }
