@@ -15,13 +15,18 @@ pub fn subdomains(elements: u64, regions: usize) -> usize {
 }
 
 /// Most subdomains that have rigid motions of their own in the coarse problem.
-const SINGLE: usize = 4000;
-/// Subdomains in a cluster beyond that.
-const CLUSTER: usize = 8;
+const SINGLE: usize = 2000;
+/// Clusters for which the smaller kind is enough.
+const ENOUGH: usize = 800;
 
-/// Subdomains in a cluster, of so many in all.
+/// Subdomains in a cluster, of so many in all: blocks of two or three along each edge. Larger ones leave a smaller coarse
+/// problem, make K^+ dearer and take more iterations.
 pub fn cluster(subdomains: usize) -> usize {
-    if subdomains > SINGLE { CLUSTER } else { 1 }
+    match subdomains {
+        0..=SINGLE => 1,
+        _ if subdomains <= 8 * ENOUGH => 8,
+        _ => 27,
+    }
 }
 
 #[cfg(test)]
@@ -30,7 +35,7 @@ mod tests {
 
     #[test]
     fn many_subdomains_share_rigid_motions() {
-        assert_eq!([1, 4000, 4001, 100_000].map(cluster), [1, 1, 8, 8]);
+        assert_eq!([1, 2000, 2001, 6400, 6401, 100_000].map(cluster), [1, 1, 8, 8, 27, 27]);
     }
 
     #[test]
