@@ -2,7 +2,7 @@
 //!
 //! Subdomains belong to the scene, ranks do not: their number, shape and numbering are the same on any number of
 //! ranks, and each rank owns a block of consecutive ones. A rank holds the meshes of its own subdomains only, and of
-//! the others just which of them share its nodes ([`interface`]).
+//! the others just which of them share its nodes ([`interface`]). Where there are many, neighbouring ones form [`clusters`].
 
 pub mod bricks;
 pub mod clusters;

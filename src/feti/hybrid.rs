@@ -97,6 +97,15 @@ impl Hybrid {
         }
     }
 
+    /// Closes the bonds of a displacement by forces between the members alone, with the least energy.
+    pub fn rejoin(&mut self, u: &mut Torn) {
+        for cluster in &mut self.0 {
+            let inverse = cluster.inverse.as_ref().expect("it follows the factors");
+            let none = vec![0.0; MODES * cluster.members.len()];
+            cluster.multipliers = inverse.solve(&cluster.bonds, none, &mut u[cluster.members.clone()]);
+        }
+    }
+
     /// Adds `B_c'mu` of the last solve: the forces by which the members hold each other.
     pub fn add_forces(&self, torn: &mut Torn) {
         for Cluster { members, bonds, multipliers, .. } in &self.0 {

@@ -1,7 +1,8 @@
 //! Total FETI: the dual of a torn problem.
 //!
 //! Notation of the paper: `K` block diagonal stiffness, `B` constraint rows, `R` rigid modes, `G = R'B'`,
-//! `F = B K^+ B'`, `P` the projector onto `Ker G`. Each symbol has a file; none knows of optimisation.
+//! `F = B K^+ B'`, `P` the projector onto `Ker G`. Each symbol has a file; none knows of optimisation. Where subdomains form
+//! clusters, `R` and `K^+` are those of the clusters ([`hybrid`]).
 
 pub mod bodies;
 pub mod cholesky;

@@ -42,7 +42,13 @@ impl<'a> DualOperator<'a> {
         }
     }
 
-    /// By `B`, the forces by which the members of clusters held each other in the last [`DualOperator::invert`]: added to
+    /// Closes the bonds of clusters in a displacement; see [`Hybrid::rejoin`]. Local.
+    pub fn rejoin(&mut self, torn: &mut Torn) {
+        self.hybrid.iter_mut().for_each(|hybrid| hybrid.rejoin(torn));
+    }
+
+    /// By `B`, the forces by which the members of clusters held each other in the last
+    /// [`DualOperator::invert`] or [`DualOperator::rejoin`]: added to
     /// multipliers that balance clusters, they balance each subdomain. `None` without clusters. One neighbour exchange.
     pub fn bonds(&self) -> Option<Vec<f64>> {
         let hybrid = self.hybrid.as_ref()?;

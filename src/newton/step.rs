@@ -294,11 +294,7 @@ impl<'a> StepSolver<'a> {
         let mut defect = vec![0.0; rows];
         let mut du = forces.clone();
         self.respond(&balanced, &mut du, &mut defect, timer);
-        if let Some(bonds) = self.operator.bonds() {
-            problem.add_gluing(&bonds, &mut lambda);
-            problem.add_gluing(&bonds, &mut balanced);
-            self.programs.settle(&lambda);
-        }
+        self.add_bonds(problem, [&mut lambda, &mut balanced]);
         let mut local = forces;
         problem.gather.add_transpose(-1.0, &balanced, &mut local);
         let wanted = forcing.drop.max(EXACT);
@@ -310,8 +306,11 @@ impl<'a> StepSolver<'a> {
             refine(&mut self.operator.factors, &self.tangents, &norm, (&local, &mut du), wanted)
         });
         if refined > 0 {
+            self.operator.rejoin(&mut du);
+            self.add_bonds(problem, [&mut lambda, &mut balanced]);
             problem.gather.apply(&du, &mut defect);
         }
+        self.programs.settle(&lambda);
         defect.iter_mut().zip(&slack).for_each(|(d, s)| *d -= s);
         if let Some(held) = self.programs.held() {
             let coarse = &self.projector.coarse;
@@ -321,6 +320,13 @@ impl<'a> StepSolver<'a> {
         self.mend(problem, &slack, &mut du, timer);
         let applications = self.operator.applications() - before + refined;
         Ok(Step { du, lambda, outcome, statistics, at_floor, local_residual, applications, factorisations })
+    }
+
+    /// Adds to multipliers what balances each member of a cluster.
+    fn add_bonds(&self, problem: &TornProblem, multipliers: [&mut Vec<f64>; 2]) {
+        if let Some(bonds) = self.operator.bonds() {
+            multipliers.into_iter().for_each(|lambda| problem.add_gluing(&bonds, lambda));
+        }
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.

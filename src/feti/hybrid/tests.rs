@@ -72,6 +72,33 @@ fn inverts_the_stiffness_of_members_that_hold_together() {
 }
 
 #[test]
+fn bonds_are_closed_without_a_force_on_any_member() {
+    let [_, blocks, _] = scenes();
+    on_ranks(&blocks, 1, |setup| {
+        let (mut hybrid, _, _) = hybrid(setup);
+        let mut u = setup.displacements(4);
+        hybrid.rejoin(&mut u);
+        let mut forces = setup.gather.zeros();
+        hybrid.add_forces(&mut forces);
+        let largest = forces.iter().flatten().fold(0.0_f64, |largest, f| largest.max(f.abs()));
+        for cluster in &hybrid.0 {
+            let mut jump = vec![0.0; cluster.bonds.rows];
+            for (member, own) in cluster.bonds.members.iter().zip(cluster.members.clone()) {
+                member.jumps.iter().for_each(|of_row| jump[of_row.row] += of_row.of(&u[own]));
+                for k in 0..MODES {
+                    let along: f64 = member.modes.iter().zip(&forces[own]).map(|(m, f)| m[k] * f).sum();
+                    assert!(along.abs() < 1e-11 * largest, "{along:e}");
+                }
+            }
+            assert!(jump.iter().all(|x| x.abs() < 1e-11), "{jump:?}");
+        }
+        let closed = u.concat();
+        hybrid.rejoin(&mut u);
+        assert_close(&column(&u.concat()), &column(&closed), 1e-11);
+    });
+}
+
+#[test]
 fn forces_between_members_balance_each_of_them() {
     for scene in scenes() {
         on_ranks(&scene, 1, |setup| {
