@@ -161,6 +161,7 @@ fn coarse(side: usize) {
         format!("body.lower.brick={}", size(0.0)),
         format!("body.upper.brick={}", size(1.0)),
         "decomposition.cells=[1, 1, 1]".to_owned(),
+        "decomposition.cluster=1".to_owned(),
     ];
     let scene = Scene::load("two-blocks", 1, &sets).expect("the scene is sound");
     let Discrete { decomposition, constraints, .. } =
@@ -170,7 +171,7 @@ fn coarse(side: usize) {
         Gather::new(&Solo, &decomposition.shares, constraints, subdomains.iter().map(Subdomain::dofs).collect());
     let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
     let start = Instant::now();
-    let mut coarse = Coarse::new(&Solo, &decomposition.shares, subdomains, &modes, constraints, &gather);
+    let mut coarse = Coarse::new(&Solo, &decomposition.clusters, subdomains, &modes, constraints, &gather);
     coarse.factorise().expect("supports hold both bodies");
     let setup = start.elapsed().as_secs_f64();
     let start = Instant::now();

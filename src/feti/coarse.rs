@@ -269,17 +269,19 @@ impl<'a> Coarse<'a> {
         (result, square, sums)
     }
 
-    /// `G rows` of the own clusters.
+    /// `G rows` of the own clusters, each summed in the order of the rows.
     fn resultants(&self, rows: &[f64]) -> Vec<[f64; MODES]> {
-        let of_cluster = |slots: &Vec<(u32, u32)>| {
-            let mut sum = [0.0; MODES];
-            for &(row, slot) in slots {
-                let x = rows[row as usize];
-                sum.iter_mut().zip(&self.slot_modes[slot as usize]).for_each(|(s, g)| *s += g * x);
+        let first = self.clusters.shares.begin(self.comm.rank());
+        let mut sums = vec![[0.0; MODES]; self.members.len()];
+        for &row in &self.moving {
+            let x = rows[row as usize];
+            for slot in self.slots(row as usize) {
+                let own = (self.slot_cluster[slot] as usize).checked_sub(first);
+                let Some(sum) = own.and_then(|own| sums.get_mut(own)) else { continue };
+                sum.iter_mut().zip(&self.slot_modes[slot]).for_each(|(s, g)| *s += g * x);
             }
-            sum
-        };
-        self.own_slots.iter().map(of_cluster).collect()
+        }
+        sums
     }
 
     /// Sums six numbers an own subdomain over each cluster and brings them to every rank.
