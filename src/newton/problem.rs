@@ -129,11 +129,11 @@ impl TornProblem<'_> {
         if norms[0] == 0.0 { 0.0 } else { norms[0] / size }
     }
 
-    /// Adds the gluing rows' part of `change` to multipliers.
+    /// Adds to multipliers those of the gluing rows whose forces have this `change` by `B`.
     pub fn add_gluing(&self, change: &[f64], lambda: &mut [f64]) {
         let gluing =
             self.constraints.rows.iter().zip(change).zip(lambda).filter(|((row, _), _)| row.kind == Kind::Gluing);
-        gluing.for_each(|((_, change), l)| *l += change);
+        gluing.for_each(|((row, change), l)| *l += change / (row.length * row.length));
     }
 
     /// `c - B u`: what is left until each constraint holds. One neighbour exchange.
