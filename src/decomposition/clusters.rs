@@ -72,8 +72,8 @@ mod tests {
         assert_eq!(subdomains.0, [5, 0, 4]);
         assert_eq!((0..9).map(|s| clusters.of(s)).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 2, 2, 2, 2]);
         assert_eq!((0..3).map(|c| clusters.first(c)).collect::<Vec<_>>(), [0, 3, 5]);
-        let of_ranks: Vec<Vec<Range<usize>>> = (0..3).map(|rank| clusters.of_rank(rank).collect()).collect();
-        assert_eq!(of_ranks, [vec![0..3, 3..5], vec![], vec![0..4]]);
+        let of_ranks = (0..3).flat_map(|rank| clusters.of_rank(rank).map(move |members| (rank, members)));
+        assert!(of_ranks.eq([(0, 0..3), (0, 3..5), (2, 0..4)]));
         assert!(!clusters.are_single());
         let singles = Clusters::singles(&Shares(vec![1, 2]));
         assert!(singles.are_single() && singles.total() == 3 && singles.of(2) == 2);

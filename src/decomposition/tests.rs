@@ -244,7 +244,7 @@ fn regions_are_cut_one_by_one_by_their_size() {
         let subdomains = threads::run(ranks, |comm| {
             let meshes = if comm.rank() == 0 { meshes.clone() } else { BTreeMap::new() };
             let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[], contact: &[] };
-            tear(&torn, Cut::Metis(parts), None, comm).subdomains
+            tear(&torn, Cut::Metis(parts), None, None, comm).subdomains
         });
         subdomains.concat()
     };

@@ -107,7 +107,7 @@ fn clusters_lead_to_the_solution_of_single_subdomains() {
 #[test]
 fn clusters_of_nearly_incompressible_bodies_stay_closed_where_factors_are_refined() {
     let found = solved_alike_by_clusters(&["material.hard.poisson=0.4999", "material.soft.poisson=0.4999"]);
-    let gluing = found.residuals.gluing.expect("it is known");
+    let gluing = found.state.residuals.gluing.expect("it is known");
     assert!(gluing < 1e-12, "{gluing:e}");
 }
 
