@@ -28,6 +28,7 @@ impl Constraints {
         pairs: &[ContactPair],
         stiffness: &[f64],
     ) -> Result<Self, ConstraintError> {
+        let largest = stiffness.iter().copied().fold(0.0, f64::max);
         dirichlet::check(comm, &decomposition.interface, supports)?;
         let contact_nodes = gather_nodes(comm, decomposition, pairs);
         let (cluster_of, clusters) = clusters(pairs);
@@ -66,7 +67,7 @@ impl Constraints {
                 }
             }
             rows.extend(contacts.into_values().flatten());
-            rows.iter_mut().for_each(|row| row.weigh(stiffness));
+            rows.iter_mut().for_each(|row| row.weigh(stiffness, largest));
             let subdomains: BTreeSet<u32> = sides.values().flat_map(|(n, _)| n.copies.iter().copied()).collect();
             result.push_block(rows, subdomains.into_iter().collect(), decomposition);
         }

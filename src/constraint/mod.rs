@@ -95,9 +95,8 @@ const JUMP: f64 = 16.0;
 
 impl Row {
     /// Makes a unit vector as long as the root of the stiffness it works against, relative to the largest and up to a power of
-    /// two, given that of all subdomains.
-    fn weigh(&mut self, stiffness: &[f64]) {
-        let largest = stiffness.iter().copied().fold(0.0, f64::max);
+    /// two, given that of all subdomains and the largest of these.
+    fn weigh(&mut self, stiffness: &[f64], largest: f64) {
         let flexibility: f64 = self.terms.iter().map(|t| t.value * t.value / stiffness[t.subdomain as usize]).sum();
         let relative = 1.0 / (flexibility * largest);
         if relative * JUMP <= 1.0 {
