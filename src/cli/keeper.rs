@@ -122,9 +122,9 @@ impl<'a> Keeper<'a> {
         &self.path
     }
 
-    /// Lets `write` write a checkpoint if it is time; whether the run has to end here, which [`Keeper::end`] explains.
-    /// Collective.
-    pub fn pause(&self, write: impl FnOnce(&Path) -> Result<(), OutputError>) -> bool {
+    /// Lets `write` write a checkpoint if it is time; whether the run has to end here, which [`Keeper::end`] explains. Where it
+    /// need not end, a checkpoint that cannot be written is told to `warn`. Collective.
+    pub fn pause(&self, write: impl FnOnce(&Path) -> Result<(), OutputError>, warn: impl FnOnce(String)) -> bool {
         let due = self.due();
         if due == Due::Nothing {
             return false;
@@ -135,8 +135,11 @@ impl<'a> Keeper<'a> {
         self.asked.set(Some(Instant::now()));
         self.writing.set(self.writing.get().max(begin.elapsed()));
         let end = match (outcome, due) {
-            (Err(error), _) => Some(Err(error)),
-            (Ok(()), Due::Stop(reason)) => Some(Ok(reason)),
+            (outcome, Due::Stop(reason)) => Some(outcome.map(|()| reason)),
+            (Err(error), _) => {
+                warn(format!("going on without a new checkpoint: {error}"));
+                None
+            }
             (Ok(()), _) => None,
         };
         let ends = end.is_some();
@@ -200,11 +203,11 @@ mod tests {
         let ends = threads::run(3, |comm| {
             let (timer, signals) = (Timer::start(), Signals::default());
             let keeper = Keeper::new(comm, &timer, Checkpoints::default(), signals.clone(), "there".into());
-            assert!(!keeper.pause(|_| panic!("nothing is due")));
+            assert!(!keeper.pause(|_| panic!("nothing is due"), |_| ()));
             if comm.rank() == 1 {
                 signals.0.store(2, Ordering::Relaxed);
             }
-            assert!(keeper.pause(|_| Ok(())));
+            assert!(keeper.pause(|_| Ok(()), |_| ()));
             keeper.end()
         });
         assert!(ends.into_iter().all(|end| end == Some(Ok("stopped by SIGTERM".into()))));
@@ -224,17 +227,28 @@ mod tests {
             Ok(())
         };
         let often = keeper(options(1, 3_600_000));
-        assert!(!often.pause(write) || written.get() == 1);
+        let warn = |text| panic!("all is well, but {text}");
+        assert!(!often.pause(write, warn) || written.get() == 1);
         std::thread::sleep(Duration::from_millis(2));
-        assert!(!often.pause(write) && written.get() > 0 && often.end().is_none());
+        assert!(!often.pause(write, warn) && written.get() > 0 && often.end().is_none());
         let late = keeper(options(3_600_000, 1));
-        assert!(!late.pause(write), "one step is done however little time there is");
-        assert!(late.pause(write));
+        assert!(!late.pause(write, warn), "one step is done however little time there is");
+        assert!(late.pause(write, warn));
         assert_eq!(late.end(), Some(Ok("stopped before the time limit".into())));
-        let failing = keeper(options(1, 3_600_000));
+    }
+
+    #[test]
+    fn a_checkpoint_that_cannot_be_written_ends_only_a_run_that_ends_here() {
+        let (timer, signals, told) = (Timer::start(), Signals::default(), RefCell::new(String::new()));
+        let options = Checkpoints { checkpoint_every: Some(Duration::from_millis(1)), time_limit: None };
+        let keeper = Keeper::new(&Solo, &timer, options, signals.clone(), "there".into());
         std::thread::sleep(Duration::from_millis(2));
         let error = OutputError::Write { path: "there".into(), reason: "full".into() };
-        assert!(failing.pause(|_| Err(error.clone())));
-        assert_eq!(failing.end(), Some(Err(error)));
+        let pause = || keeper.pause(|_| Err(error.clone()), |text| *told.borrow_mut() = text);
+        assert!(!pause() && keeper.end().is_none());
+        assert!(told.take().starts_with("going on without a new checkpoint: cannot write there: full"));
+        signals.0.store(1, Ordering::Relaxed);
+        assert!(pause() && told.take().is_empty());
+        assert_eq!(keeper.end(), Some(Err(error)));
     }
 }

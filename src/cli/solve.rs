@@ -1,7 +1,8 @@
 //! `fetiplast solve`: a scene, coarser levels first where that pays, to files of results.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
@@ -265,15 +266,17 @@ impl Run<'_> {
             let earlier = timer.time("initial state", || study::earlier(comm, scene, &discrete, initial));
             begin = Begin::After(earlier.map_err(StudyError::from)?);
         }
+        let monitor = RefCell::new(monitor);
+        let tell = |event: Event| monitor.borrow_mut().event(&event);
         let pause = |standing: &dyn Fn() -> study::Standing| {
-            keeper.pause(|path| {
+            let write = |path: &Path| {
                 let (mut texts, arrays) = pack(comm, &discrete, standing());
                 texts.extend(labels(plan, &self.scene));
                 checkpoint::write(comm, path, &texts, &arrays)
-            })
+            };
+            keeper.pause(write, |text| tell(Event::Warning(text)))
         };
-        let solved =
-            study::solve_from(scene, &discrete, comm, begin, timer, &mut |event| monitor.event(&event), &pause);
+        let solved = study::solve_from(scene, &discrete, comm, begin, timer, &mut |event| tell(event), &pause);
         match (solved, keeper.end()) {
             (Err(StudyError::Stopped), Some(Ok(reason))) => {
                 Err(Failure::Stopped { reason, path: keeper.path().to_owned() })
