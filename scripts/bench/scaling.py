@@ -13,10 +13,13 @@ RESULTS = ROOT / "bench-results"
 HEAD = """\
 # Scalability
 
-Written by `scripts/study write` from the newest commit's runs in [raw/scaling](raw/scaling), which `scripts/study run` made.
+Written by `scripts/study write` from the newest commit's runs of each kind in [raw/scaling](raw/scaling), which
+`scripts/study run` made.
 Seconds are of the whole solve without starting and ending the processes, medians of the repetitions with smallest and
 largest; so is memory. Speed-up and efficiency are those of the medians, against the smallest number of ranks. Runs start
-from rest unless their options name a cascade. Counts do not depend on the number of ranks. `cells` are those along the edge of a subdomain.
+from rest unless their options name a cascade. Counts do not depend on the number of ranks. `cells` are those along the edge
+of a subdomain. Where subdomains form clusters (hybrid Total-FETI) the coarse problem has six unknowns a cluster; its part of the
+time, set-up included, is that of the median run.
 """
 
 BUSY = " (machine busy: only counts mean something)"
@@ -41,7 +44,7 @@ class Kind(typing.NamedTuple):
 
 
 def read(folder):
-    """Groups of the newest commit, machine and launcher apart, by kind and ranks."""
+    """Groups by kind and ranks, of the newest commit and machine that ran that kind."""
     records = [json.loads(line) for file in sorted(folder.glob("*.jsonl")) for line in file.read_text().splitlines()]
     records = [record for record in records if record["exit_code"] == 0 and record["summary"]]
     if not records:
@@ -50,12 +53,14 @@ def read(folder):
     def origin(record):
         return [record["provenance"][key] for key in ("commit", "dirty", "cpu", "cores")]
 
-    newest = origin(max(records, key=lambda record: record["provenance"]["date"]))
+    def kind(record):
+        return Kind(*(record[field] for field in Kind._fields))
+
+    newest = {kind(r): origin(r) for r in sorted(records, key=lambda record: record["provenance"]["date"])}
     kinds = {}
     for record in records:
-        if origin(record) == newest:
-            kind = Kind(*(record[field] for field in Kind._fields))
-            kinds.setdefault((kind, record["ranks"]), []).append(record)
+        if origin(record) == newest[kind(record)]:
+            kinds.setdefault((kind(record), record["ranks"]), []).append(record)
     return {key: Group(of_kind) for key, of_kind in sorted(kinds.items())}
 
 
@@ -112,25 +117,36 @@ def numerical(groups):
     return {key: of_levels for key, of_levels in found.items() if len(of_levels) > 1}
 
 
+def clusters(group):
+    found = group.first.get("clusters", group.first["subdomains"])
+    return "" if found == group.first["subdomains"] else thousands(found)
+
+
+def coarse(group):
+    found = phases(group)
+    return f"{100 * found['coarse problem'] / sum(found.values()):.1f}" if group.timed else ""
+
+
 def numerical_table(studies):
-    head = ["", "level", "subdomains", "primal unknowns", "dual unknowns", "Newton steps", "multiplications by F"]
-    head += ["a Newton step", "seconds", "ranks"]
+    head = ["", "level", "subdomains", "clusters", "primal unknowns", "dual unknowns", "Newton steps", "multiplications by F"]
+    head += ["a Newton step", "seconds", "coarse problem, %", "ranks"]
     rows = []
     for (scene, options, cells), levels in studies.items():
         for place, (level, group) in enumerate(sorted(levels.items())):
             steps, products = group.count("newton_iterations"), group.count("hessian_multiplications")
             name = Kind(scene, options, level, 1, cells).name().replace(f", level {level}", "")
             rows.append(
-                ["" if place else name, level, thousands(group.count("subdomains")), thousands(group.count("primal_dofs"))]
-                + [thousands(group.count("dual_dofs")), steps, products, f"{products / steps:.1f}"]
-                + [group.seconds(lambda s: s["time_total"]), group.first["ranks"]]
+                ["" if place else name, level, thousands(group.count("subdomains")), clusters(group)]
+                + [thousands(group.count("primal_dofs")), thousands(group.count("dual_dofs")), steps, products]
+                + [f"{products / steps:.1f}", group.seconds(lambda s: s["time_total"]), coarse(group), group.first["ranks"]]
             )
     return table(head, rows)
 
 
 PARTS = ["factorisation", "dual operator", "preconditioner", "coarse problem", "inner products", "assembly", "internal forces", "messages"]
 """Phases that have a colour of their own, with what belongs to them."""
-WITH = {"factorisation of the interior": "factorisation", "symbolic analysis": "factorisation", "coarse set-up": "coarse problem"}
+WITH = {"factorisation of the interior": "factorisation", "symbolic analysis": "factorisation", "clusters": "factorisation"}
+WITH |= {"coarse set-up": "coarse problem"}
 
 
 def memory_of_a_rank(summary):

@@ -198,8 +198,8 @@ pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape, Vec<usize>)>
 }
 
 /// Tears the bodies into subdomains and these into clusters of about `cluster` (by their number if nothing is said).
-/// `yielding` says which boxes of
-/// [`Cut::Bricks`] of each body, x fastest, are expected to yield: every rank gets its part of them. Collective.
+/// `yielding` says which boxes of [`Cut::Bricks`] of each body, x fastest, are expected to yield: every rank gets its part of
+/// them. Collective.
 pub fn tear(
     bodies: &Bodies,
     cut: Cut,
