@@ -20,19 +20,8 @@ pub struct RigidModes {
 impl RigidModes {
     /// Of the given nodes, which do not lie on one line.
     pub fn new(points: &[[f64; 3]]) -> Self {
-        let count = points.len() as f64;
-        let centre: [f64; 3] = std::array::from_fn(|a| points.iter().map(|p| p[a]).sum::<f64>() / count);
-        let mut gram = [[0.0; 3]; 3];
-        for point in points {
-            let arm: [f64; 3] = std::array::from_fn(|a| point[a] - centre[a]);
-            let square: f64 = arm.iter().map(|x| x * x).sum();
-            for a in 0..3 {
-                for b in 0..3 {
-                    gram[a][b] += if a == b { square } else { 0.0 } - arm[a] * arm[b];
-                }
-            }
-        }
-        Self { centre, translation: 1.0 / count.sqrt(), axes: inverse_cholesky(gram) }
+        let (centre, gram) = inertia(points);
+        Self { centre, translation: 1.0 / (points.len() as f64).sqrt(), axes: inverse_cholesky(gram) }
     }
 
     /// The modes' displacements at a point, `[component][mode]`.
@@ -78,6 +67,22 @@ pub fn of_clusters(clusters: impl Iterator<Item = Range<usize>>, subdomains: &[S
         modes.resize(members.end, RigidModes::new(&points));
     }
     modes
+}
+
+/// The centroid of points and their inertia tensor about it.
+pub fn inertia(points: &[[f64; 3]]) -> ([f64; 3], [[f64; 3]; 3]) {
+    let centre: [f64; 3] = std::array::from_fn(|a| points.iter().map(|p| p[a]).sum::<f64>() / points.len() as f64);
+    let mut moments = [[0.0; 3]; 3];
+    for point in points {
+        let arm: [f64; 3] = std::array::from_fn(|a| point[a] - centre[a]);
+        let square: f64 = arm.iter().map(|x| x * x).sum();
+        for a in 0..3 {
+            for b in 0..3 {
+                moments[a][b] += if a == b { square } else { 0.0 } - arm[a] * arm[b];
+            }
+        }
+    }
+    (centre, moments)
 }
 
 /// `L^-1` of `gram = L L'`.

@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use crate::decomposition::Subdomain;
 use crate::feti::coarse::MODES;
-use crate::feti::kernel::RigidModes;
+use crate::feti::kernel::{RigidModes, inertia};
 
 /// Nodes are a face if the product of their principal moments is more than this share of the cube of their sum.
 const SPREAD: f64 = 1e-9;
@@ -169,18 +169,7 @@ fn shared_nodes(one: &Subdomain, other: &Subdomain) -> Vec<[u32; 2]> {
 
 /// Whether points do not lie on one line.
 fn is_face(points: &[[f64; 3]]) -> bool {
-    let centre: [f64; 3] = std::array::from_fn(|a| points.iter().map(|p| p[a]).sum::<f64>() / points.len() as f64);
-    let mut moments = [[0.0; 3]; 3];
-    for point in points {
-        let arm: [f64; 3] = std::array::from_fn(|a| point[a] - centre[a]);
-        let square: f64 = arm.iter().map(|x| x * x).sum();
-        for a in 0..3 {
-            for b in 0..3 {
-                moments[a][b] += if a == b { square } else { 0.0 } - arm[a] * arm[b];
-            }
-        }
-    }
-    let [[a, b, c], [_, d, e], [.., f]] = moments;
+    let [[a, b, c], [_, d, e], [.., f]] = inertia(points).1;
     let determinant = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d);
     determinant > SPREAD * (a + d + f).powi(3)
 }
