@@ -211,16 +211,8 @@ impl DualGraph {
         let begin: Vec<i32> = (0..=parts).map(|p| pairs.partition_point(|pair| (pair.0 as usize) < p) as i32).collect();
         let adjacency: Vec<i32> = pairs.iter().map(|pair| pair.1).collect();
         let weights: Vec<i32> = faces.into_values().collect();
-        let (mut group, wanted) = (vec![0; parts], parts.div_ceil(cluster) as i32);
-        if wanted > 1 {
-            let _alone = alone();
-            Graph::new(1, wanted, &begin, &adjacency)
-                .expect("the rows are in order")
-                .set_adjwgt(&weights)
-                .set_option(Seed(1))
-                .part_kway(&mut group)
-                .expect("every part has a group");
-        }
+        let wanted = parts.div_ceil(cluster) as i32;
+        let mut group = if wanted > 1 { kway((&begin, &adjacency), &weights, wanted, false) } else { vec![0; parts] };
         let neighbours =
             |p: usize| adjacency[begin[p] as usize..begin[p + 1] as usize].iter().map(|&other| other as u32);
         let mut clusters = vec![Vec::new(); split_into_pieces(&mut group, neighbours)];
@@ -240,17 +232,23 @@ impl DualGraph {
             }
             begin.push(adjacency.len() as i32);
         }
-        let mut parts = vec![0; piece.len()];
-        let _alone = alone();
-        Graph::new(1, wanted, &begin, &adjacency)
-            .expect("the rows are in order")
-            .set_adjwgt(&weights)
-            .set_option(Contig(true))
-            .set_option(Seed(1))
-            .part_kway(&mut parts)
-            .expect("the graph of a piece is connected");
-        parts
+        kway((&begin, &adjacency), &weights, wanted, true)
     }
+}
+
+/// Part of each vertex of a graph, given by begins and neighbours, with little weight between the parts; contiguous ones need
+/// a connected graph.
+fn kway((begin, adjacency): (&[i32], &[i32]), weights: &[i32], wanted: i32, contiguous: bool) -> Vec<i32> {
+    let mut parts = vec![0; begin.len() - 1];
+    let _alone = alone();
+    Graph::new(1, wanted, begin, adjacency)
+        .expect("the rows are in order")
+        .set_adjwgt(weights)
+        .set_option(Contig(contiguous))
+        .set_option(Seed(1))
+        .part_kway(&mut parts)
+        .expect("the graph is one that METIS can cut");
+    parts
 }
 
 /// Nodes of a body on contact surfaces, some several times.
