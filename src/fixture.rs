@@ -121,6 +121,11 @@ pub fn quarters(materials: &str, sets: &[&str]) -> Scene {
     Scene::from_text(&text, "quarters", 1, &owned(sets)).expect("the scene is sound")
 }
 
+/// Two bodies, each of four clusters of eight subdomains.
+pub fn clustered() -> Scene {
+    built_in("patch", &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=8"])
+}
+
 /// As [`two_bricks`], with meshes that do not match: all contact rows are in one block.
 pub fn not_matching(sets: &[&str]) -> Scene {
     let cells =

@@ -47,9 +47,9 @@ impl<'a> DualOperator<'a> {
         self.hybrid.iter_mut().for_each(|hybrid| hybrid.rejoin(torn));
     }
 
-    /// By `B`, the forces by which the members of clusters held each other in the last
-    /// [`DualOperator::invert`] or [`DualOperator::rejoin`]: added to
-    /// multipliers that balance clusters, they balance each subdomain. `None` without clusters. One neighbour exchange.
+    /// By `B`, the forces by which the members of clusters held each other in the last [`DualOperator::invert`] or
+    /// [`DualOperator::rejoin`]: added to multipliers that balance clusters, they balance each subdomain. `None` without
+    /// clusters. One neighbour exchange.
     pub fn bonds(&self) -> Option<Vec<f64>> {
         let hybrid = self.hybrid.as_ref()?;
         let mut torn = self.gather.zeros();
@@ -91,8 +91,8 @@ mod tests {
     use faer::{Mat, Side};
 
     use crate::fixture::{
-        Setup, assert_close, block_diagonal, built_in, column, dense, on_ranks, same_on_any_ranks, two_bricks,
-        two_bricks_by_metis,
+        Setup, assert_close, block_diagonal, built_in, clustered, column, dense, on_ranks, same_on_any_ranks,
+        two_bricks, two_bricks_by_metis,
     };
 
     /// `F` by its columns.
@@ -173,8 +173,7 @@ mod tests {
 
     #[test]
     fn images_are_the_same_bits_on_any_ranks() {
-        let clusters = built_in("patch", &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=8"]);
-        for scene in [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[]), clusters] {
+        for scene in [two_bricks(&[]), two_bricks_by_metis(7), built_in("patch", &[]), clustered()] {
             same_on_any_ranks(&scene, |setup| {
                 let mut image = vec![0.0; setup.rows().len()];
                 setup.operator().apply(&setup.multipliers(7), &mut image);

@@ -47,12 +47,11 @@ impl Projector<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::{Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis};
+    use crate::fixture::{Setup, clustered, on_ranks, two_bricks, two_bricks_by_metis};
     use crate::scene::Scene;
 
     fn scenes() -> [Scene; 3] {
-        let clusters = built_in("patch", &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=8"]);
-        [two_bricks(&[]), clusters, two_bricks_by_metis(7)]
+        [two_bricks(&[]), clustered(), two_bricks_by_metis(7)]
     }
 
     fn projector<'a>(setup: &Setup<'a>) -> Projector<'a> {

@@ -5,18 +5,14 @@ use super::MODES;
 use crate::constraint::Kind;
 use crate::feti::projector::Projector;
 use crate::fixture::{
-    RANKS, Setup, assert_close, built_in, column, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis,
+    RANKS, Setup, assert_close, built_in, clustered, column, on_ranks, same_on_any_ranks, two_bricks,
+    two_bricks_by_metis,
 };
 use crate::random::Random;
 use crate::scene::Scene;
 
 fn scenes() -> [Scene; 4] {
-    [two_bricks(&[]), two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7), clusters()]
-}
-
-/// Four clusters of eight subdomains a body.
-fn clusters() -> Scene {
-    built_in("patch", &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=8"])
+    [two_bricks(&[]), two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7), clustered()]
 }
 
 /// `G = R'B'`.
@@ -68,7 +64,7 @@ fn a_restricted_coarse_problem_knows_the_kept_rows_only() {
 
 #[test]
 fn coarse_products_and_solutions_are_the_same_bits_on_any_ranks() {
-    for scene in [clusters(), two_bricks_by_metis(7)] {
+    for scene in [clustered(), two_bricks_by_metis(7)] {
         for solved in [false, true] {
             same_on_any_ranks(&scene, |setup| {
                 let coarse = setup.coarse().expect("the bodies are held");
