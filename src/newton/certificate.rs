@@ -81,7 +81,7 @@ impl StepSolver<'_> {
             let mut torn = problem.unbalance(state);
             problem.gather.add_transpose(-1.0, &lambda, &mut torn);
             timer.time("certificate", || self.operator.invert(&mut torn));
-            self.operator.bonds().iter().for_each(|bonds| problem.add_gluing(bonds, &mut lambda));
+            self.add_bonds(problem, [&mut lambda]);
         }
         let pull: Vec<f64> = lambda
             .iter()

@@ -323,7 +323,7 @@ impl<'a> StepSolver<'a> {
     }
 
     /// Adds to multipliers what balances each member of a cluster.
-    fn add_bonds(&self, problem: &TornProblem, multipliers: [&mut Vec<f64>; 2]) {
+    pub(super) fn add_bonds<const N: usize>(&self, problem: &TornProblem, multipliers: [&mut Vec<f64>; N]) {
         if let Some(bonds) = self.operator.bonds() {
             multipliers.into_iter().for_each(|lambda| problem.add_gluing(&bonds, lambda));
         }
