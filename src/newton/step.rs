@@ -428,12 +428,14 @@ impl<'a> StepSolver<'a> {
             };
         }
         agree_on(failure, problem)?;
-        let loose = timer.time("clusters", || self.operator.update_clusters()).err();
-        let loose = loose.map(|own| problem.subdomains[own].id);
-        if let Some(subdomain) = first_of_all(loose, problem) {
-            return Err(format!(
-                "the cluster of subdomain {subdomain} has no stiffness: set decomposition.cluster = 1"
-            ));
+        if self.operator.is_hybrid() {
+            let loose = timer.time("clusters", || self.operator.update_clusters()).err();
+            let loose = loose.map(|own| problem.subdomains[own].id);
+            if let Some(subdomain) = first_of_all(loose, problem) {
+                return Err(format!(
+                    "the cluster of subdomain {subdomain} has no stiffness: set decomposition.cluster = 1"
+                ));
+            }
         }
         if let Some(preconditioner) = &mut self.preconditioner {
             let diagonals: Vec<Vec<f64>> = self
