@@ -197,7 +197,7 @@ pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape, Vec<usize>)>
         .collect()
 }
 
-/// Tears the bodies into subdomains and these into clusters of about `cluster` (by their number if nothing is said).
+/// Tears the bodies into subdomains and these into clusters of about `cluster` (see [`cost::cluster`] if nothing is said).
 /// `yielding` says which boxes of [`Cut::Bricks`] of each body, x fastest, are expected to yield: every rank gets its part of
 /// them. Collective.
 pub fn tear(
@@ -207,21 +207,24 @@ pub fn tear(
     yielding: Option<&[Vec<bool>]>,
     comm: &dyn Comm,
 ) -> Decomposition {
+    let cluster = |subdomains| cluster.unwrap_or_else(|| cost::cluster(subdomains, tetrahedra(bodies.bodies)));
     let (clusters, shares, subdomains) = match cut {
         Cut::Bricks(cells) => {
-            let count = bodies.bodies.iter().map(|body| bricks::count(body, cells)).sum();
-            let cluster = cluster.unwrap_or_else(|| cost::cluster(count));
+            let cluster = cluster(bodies.bodies.iter().map(|body| bricks::count(body, cells)).sum());
             let (clusters, shares, lists) = bricks::own_elements(bodies.bodies, cells, cluster, yielding, comm);
             let ids = shares.begin(comm.rank())..;
             let of_brick = |(id, (body, list)): (usize, ElementList)| Subdomain::of_brick(id, bodies, body, &list);
             (clusters, shares, ids.zip(lists).map(of_brick).collect())
         }
-        Cut::Metis(parts) => {
-            metis::own_subdomains(bodies, parts, cluster.unwrap_or_else(|| cost::cluster(parts)), comm)
-        }
+        Cut::Metis(parts) => metis::own_subdomains(bodies, parts, cluster(parts), comm),
     };
     let interface = interface::share(comm, &subdomains);
     Decomposition { shares, clusters, subdomains, interface }
+}
+
+/// As many linear tetrahedra as would take the work of these bodies' elements.
+pub fn tetrahedra(bodies: &[BodyMesh]) -> u64 {
+    bodies.iter().map(|body| body.counts().elements * body.kind.tetrahedra()).sum()
 }
 
 /// Elements of one subdomain: its body, and the numbers of its elements within the body, ascending.

@@ -15,7 +15,6 @@ use self::factor::{Blocks, CoarseFactor, Symbolic};
 use super::bodies::BodyMotions;
 use super::gather::Gather;
 use super::kernel::RigidModes;
-use super::space::RowSpace;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::{Clusters, Subdomain};
@@ -34,6 +33,12 @@ pub struct Floating {
     pub subdomain: usize,
 }
 
+/// A row that acts on a cluster, with a copy of its slot's modes: what is summed lies side by side.
+struct Acting {
+    row: u32,
+    modes: [f64; MODES],
+}
+
 /// `G` and the factor of `G G'`.
 pub struct Coarse<'a> {
     comm: &'a dyn Comm,
@@ -46,12 +51,10 @@ pub struct Coarse<'a> {
     slot_modes: Vec<[f64; MODES]>,
     /// Rows with slots.
     moving: Vec<u32>,
-    /// For each own cluster, its (row, slot) in row order.
-    own_slots: Vec<Vec<(u32, u32)>>,
-    /// Whether an inequality acts on it.
-    bounded: Vec<bool>,
-    /// Block rows of the others.
-    constant: OnceCell<Blocks>,
+    /// What acts on each own cluster, in row order: equalities, and inequalities.
+    acting: [Vec<Vec<Acting>>; 2],
+    /// `G G'` of the equalities, on every rank.
+    equalities: OnceCell<Blocks>,
     motions: BodyMotions,
     /// For all rows, and so for any.
     symbolic: OnceCell<Rc<Symbolic>>,
@@ -72,7 +75,7 @@ impl<'a> Coarse<'a> {
     ) -> Self {
         let first = clusters.shares.begin(comm.rank());
         let members: Vec<Range<usize>> = clusters.of_rank(comm.rank()).collect();
-        let (mut own_slots, mut bounded) = (vec![Vec::new(); members.len()], vec![false; members.len()]);
+        let mut acting = [(); 2].map(|()| members.iter().map(|_| Vec::new()).collect::<Vec<Vec<Acting>>>());
         let mut moving = Vec::new();
         let (mut slot_begin, mut slot_cluster, mut slot_modes) = (vec![0], Vec::new(), Vec::new());
         gather.exchange(
@@ -102,10 +105,10 @@ impl<'a> Coarse<'a> {
                     slot_cluster.truncate(begin);
                     slot_modes.truncate(begin);
                 }
+                let acting = &mut acting[usize::from(constraints.rows[row].is_inequality())];
                 for (slot, &cluster) in (begin..).zip(&slot_cluster[begin..]) {
-                    if let Some(own) = (cluster as usize).checked_sub(first).filter(|&own| own < own_slots.len()) {
-                        own_slots[own].push((row as u32, slot as u32));
-                        bounded[own] |= constraints.rows[row].is_inequality();
+                    if let Some(own) = (cluster as usize).checked_sub(first).filter(|&own| own < acting.len()) {
+                        acting[own].push(Acting { row: row as u32, modes: slot_modes[slot] });
                     }
                 }
                 if slot_cluster.len() > begin {
@@ -123,9 +126,8 @@ impl<'a> Coarse<'a> {
             slot_cluster,
             slot_modes,
             moving,
-            own_slots,
-            bounded,
-            constant: OnceCell::new(),
+            acting,
+            equalities: OnceCell::new(),
             symbolic: OnceCell::new(),
             factor: None,
         }
@@ -164,7 +166,14 @@ impl<'a> Coarse<'a> {
     /// The blocks of `G G'` of the kept rows, which are all equalities and some inequalities; lower triangle, on every rank.
     /// Collective.
     pub fn blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
-        share_blocks(self.comm, &self.own_blocks(kept))
+        let [equalities, inequalities] = &self.acting;
+        let constant = || self.products(equalities, |_| true).collect();
+        let mut blocks: Blocks = self.equalities.get_or_init(constant).clone();
+        for (place, product) in self.products(inequalities, kept) {
+            let block = blocks.entry(place).or_insert([0.0; MODES * MODES]);
+            block.iter_mut().zip(product).for_each(|(b, p)| *b += p);
+        }
+        blocks
     }
 
     /// `G' motion` of all rows, of six numbers a cluster. Local.
@@ -188,29 +197,22 @@ impl<'a> Coarse<'a> {
         forces
     }
 
-    /// Block rows of `G G'` that belong to own clusters, lower triangle. Complete: every row that a subdomain takes
-    /// part in is on its rank.
-    fn own_blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
-        let constant = || self.block_rows(|own| !self.bounded[own], |_| true).collect();
-        let mut blocks: Blocks = self.constant.get_or_init(constant).clone();
-        blocks.extend(self.block_rows(|own| self.bounded[own], kept));
-        blocks
-    }
-
-    /// Block rows of some own clusters.
-    fn block_rows(
+    /// Blocks of `G G'` of the kept among some rows, given for each own cluster; lower triangle, those of all ranks on
+    /// every rank. Complete: every row that a subdomain takes part in is on its rank. Collective.
+    fn products(
         &self,
-        of: impl Fn(usize) -> bool,
+        acting: &[Vec<Acting>],
         kept: impl Fn(usize) -> bool,
     ) -> impl Iterator<Item = ((usize, usize), [f64; MODES * MODES])> {
         let first = self.clusters.shares.begin(self.comm.rank());
-        (0..self.members.len()).filter(move |&own| of(own)).flat_map(move |own| {
+        let mut message = Vec::new();
+        for (cluster, acting) in (first..).zip(acting) {
             // A cluster has few neighbours.
             let (mut columns, mut blocks): (Vec<u32>, Vec<[f64; MODES * MODES]>) = Default::default();
-            for &(row, slot) in self.own_slots[own].iter().filter(|(row, _)| kept(*row as usize)) {
-                for other in self.slots(row as usize) {
+            for Acting { row, modes } in acting.iter().filter(|acting| kept(acting.row as usize)) {
+                for other in self.slots(*row as usize) {
                     let column = self.slot_cluster[other];
-                    if column as usize > first + own {
+                    if column as usize > cluster {
                         continue;
                     }
                     let at = columns.iter().position(|c| *c == column).unwrap_or_else(|| {
@@ -218,15 +220,18 @@ impl<'a> Coarse<'a> {
                         columns.push(column);
                         columns.len() - 1
                     });
-                    for (a, products) in
-                        self.slot_modes[slot as usize].iter().zip(blocks[at].as_chunks_mut::<MODES>().0)
-                    {
+                    for (a, products) in modes.iter().zip(blocks[at].as_chunks_mut::<MODES>().0) {
                         products.iter_mut().zip(&self.slot_modes[other]).for_each(|(p, b)| *p += a * b);
                     }
                 }
             }
-            columns.into_iter().map(move |column| (first + own, column as usize)).zip(blocks)
-        })
+            for (column, block) in columns.iter().zip(&blocks) {
+                message.extend([cluster as u64, u64::from(*column)]);
+                message.extend(block.map(f64::to_bits));
+            }
+        }
+        let all = all_gather_u64(self.comm, &message).as_chunks::<{ 2 + MODES * MODES }>().0.to_vec();
+        all.into_iter().map(|[row, column, block @ ..]| ((row as usize, column as usize), block.map(f64::from_bits)))
     }
 
     fn slots(&self, row: usize) -> std::ops::Range<usize> {
@@ -238,20 +243,10 @@ impl<'a> Coarse<'a> {
         self.comm.all_gather(self.resultants(rows).as_flattened(), &self.clusters.shares.counts(MODES))
     }
 
-    /// As [`Coarse::apply`], and in the same all-gather the square of `rows`, and its inner products with each of
-    /// `against`, then those of `pairs`.
-    pub fn apply_with_products(
-        &self,
-        space: &RowSpace,
-        rows: &[f64],
-        against: &[&[f64]],
-        pairs: &[(&[f64], &[f64])],
-    ) -> (Vec<f64>, f64, Vec<f64>) {
-        let mut all = vec![(rows, rows)];
-        all.extend(against.iter().map(|other| (rows, *other)));
-        all.extend(pairs);
-        let width = all.len();
-        let partial = self.over_members(&space.partial(&all), width);
+    /// As [`Coarse::apply`], and in the same all-gather the sums over all subdomains of `width` numbers, given for each own
+    /// one.
+    pub fn apply_with_sums(&self, rows: &[f64], partial: &[f64], width: usize) -> (Vec<f64>, Vec<f64>) {
+        let partial = self.over_members(partial, width);
         let mut mine = Vec::with_capacity((MODES + width) * self.members.len());
         for (six, values) in self.resultants(rows).iter().zip(partial.chunks_exact(width)) {
             mine.extend_from_slice(six);
@@ -265,23 +260,21 @@ impl<'a> Coarse<'a> {
             result.extend_from_slice(six);
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
         }
-        let square = sums.remove(0);
-        (result, square, sums)
+        (result, sums)
     }
 
-    /// `G rows` of the own clusters, each summed in the order of the rows.
+    /// `G rows` of the own clusters, each summed over the equalities, then the inequalities, in the order of the rows.
     fn resultants(&self, rows: &[f64]) -> Vec<[f64; MODES]> {
-        let first = self.clusters.shares.begin(self.comm.rank());
-        let mut sums = vec![[0.0; MODES]; self.members.len()];
-        for &row in &self.moving {
-            let x = rows[row as usize];
-            for slot in self.slots(row as usize) {
-                let own = (self.slot_cluster[slot] as usize).checked_sub(first);
-                let Some(sum) = own.and_then(|own| sums.get_mut(own)) else { continue };
-                sum.iter_mut().zip(&self.slot_modes[slot]).for_each(|(s, g)| *s += g * x);
+        let [equalities, inequalities] = &self.acting;
+        let of_cluster = |(equalities, inequalities): (&Vec<Acting>, &Vec<Acting>)| {
+            let mut sum = [0.0; MODES];
+            for Acting { row, modes } in equalities.iter().chain(inequalities) {
+                let x = rows[*row as usize];
+                sum.iter_mut().zip(modes).for_each(|(s, g)| *s += g * x);
             }
-        }
-        sums
+            sum
+        };
+        equalities.iter().zip(inequalities).map(of_cluster).collect()
     }
 
     /// Sums six numbers an own subdomain over each cluster and brings them to every rank.
@@ -314,28 +307,17 @@ impl<'a> Coarse<'a> {
 
     /// `rows += factor G' a`. Local.
     pub fn add_transpose(&self, factor: f64, a: &[f64], rows: &mut [f64]) {
+        let a = a.as_chunks::<MODES>().0;
         for &row in &self.moving {
-            let mut sum = 0.0;
-            for slot in self.slots(row as usize) {
-                let at = MODES * self.slot_cluster[slot] as usize;
-                sum += self.slot_modes[slot].iter().zip(&a[at..at + MODES]).map(|(g, a)| g * a).sum::<f64>();
-            }
-            rows[row as usize] += factor * sum;
+            let of_slot = |slot: usize| dot(&self.slot_modes[slot], &a[self.slot_cluster[slot] as usize]);
+            rows[row as usize] += factor * self.slots(row as usize).map(of_slot).sum::<f64>();
         }
     }
 }
 
-/// The blocks of all ranks, on every rank.
-fn share_blocks(comm: &dyn Comm, blocks: &Blocks) -> Blocks {
-    let mut message = Vec::new();
-    for ((row, column), block) in blocks {
-        message.extend([*row as u64, *column as u64]);
-        message.extend(block.map(f64::to_bits));
-    }
-    all_gather_u64(comm, &message)
-        .chunks_exact(2 + MODES * MODES)
-        .map(|m| ((m[0] as usize, m[1] as usize), std::array::from_fn(|k| f64::from_bits(m[2 + k]))))
-        .collect()
+/// The sum of products, as three chains of additions.
+fn dot(g: &[f64; MODES], a: &[f64; MODES]) -> f64 {
+    (g[0] * a[0] + g[3] * a[3]) + (g[1] * a[1] + g[4] * a[4]) + (g[2] * a[2] + g[5] * a[5])
 }
 
 #[cfg(test)]

@@ -10,7 +10,6 @@
 use super::bodies::BodyMotions;
 use super::coarse::factor::{Blocks, CoarseFactor};
 use super::coarse::{Coarse, Floating, MODES};
-use super::space::RowSpace;
 
 /// The kept rows with their factor.
 pub struct CoarseFace {
@@ -96,23 +95,21 @@ impl CoarseFace {
         self.mask(rows);
     }
 
-    /// As [`CoarseFace::project`]; returns the squared norm of `P_A rows`, and inner products of `I_A rows` with each of
-    /// `against`, then of `pairs`. One all-gather.
-    pub fn project_with_products(
+    /// As [`CoarseFace::project`] of rows that are masked already; returns the squared norm of `P_A rows`, and the sums over all
+    /// subdomains of `width` numbers for each own one, given and returned behind those of the square of `rows`. One all-gather.
+    pub fn project_with_sums(
         &self,
         coarse: &Coarse,
-        space: &RowSpace,
         rows: &mut [f64],
-        against: &[&[f64]],
-        pairs: &[(&[f64], &[f64])],
+        partial: &[f64],
+        width: usize,
     ) -> (f64, Vec<f64>) {
-        self.mask(rows);
-        let (mut a, square, products) = coarse.apply_with_products(space, rows, against, pairs);
+        let (mut a, mut sums) = coarse.apply_with_sums(rows, partial, width);
         let e = a.clone();
         self.factor.solve(&mut a);
         coarse.add_transpose(-1.0, &a, rows);
         self.mask(rows);
-        (without(square, &e, &a), products)
+        (without(sums.remove(0), &e, &a), sums)
     }
 
     /// Adds to the kept rows the least that changes `G rows` by `e`. Local.

@@ -2,7 +2,6 @@
 
 use super::coarse::Coarse;
 use super::face::without;
-use super::space::RowSpace;
 
 /// The natural coarse grid projector.
 pub struct Projector<'a> {
@@ -19,20 +18,14 @@ impl Projector<'_> {
         a
     }
 
-    /// As [`Projector::project`]; returns the squared norm of `P rows`, and inner products of `rows` before with each of
-    /// `against`, then of `pairs`. One all-gather.
-    pub fn project_with_products(
-        &self,
-        space: &RowSpace,
-        rows: &mut [f64],
-        against: &[&[f64]],
-        pairs: &[(&[f64], &[f64])],
-    ) -> (f64, Vec<f64>) {
-        let (mut a, square, products) = self.coarse.apply_with_products(space, rows, against, pairs);
+    /// As [`Projector::project`]; returns the squared norm of `P rows`, and the sums over all subdomains of `width` numbers
+    /// for each own one, given and returned behind those of the square of `rows`. One all-gather.
+    pub fn project_with_sums(&self, rows: &mut [f64], partial: &[f64], width: usize) -> (f64, Vec<f64>) {
+        let (mut a, mut sums) = self.coarse.apply_with_sums(rows, partial, width);
         let e = a.clone();
         self.coarse.solve(&mut a);
         self.coarse.add_transpose(-1.0, &a, rows);
-        (without(square, &e, &a), products)
+        (without(sums.remove(0), &e, &a), sums)
     }
 
     /// The smallest `rows` with `G rows = e`: `G'(G G')^-1 e`. Local.

@@ -54,6 +54,15 @@ impl<'a> Dual<'_, 'a> {
             self.timer.time("scaling", || preconditioner.scaling.restrict(constraints, |row| kept[row]));
         }
     }
+
+    /// The parts of `x'x`, of `x` with each of `against`, and of `pairs`, that count for each own subdomain; how many products
+    /// these are.
+    fn partial(&self, x: &[f64], against: &[&[f64]], pairs: &[(&[f64], &[f64])]) -> (Vec<f64>, usize) {
+        let mut all = vec![(x, x)];
+        all.extend(against.iter().map(|other| (x, *other)));
+        all.extend(pairs);
+        (self.timer.time("inner products", || self.space.partial(&all)), all.len())
+    }
 }
 
 impl Operator for Dual<'_, '_> {
@@ -76,8 +85,8 @@ impl Projection for Dual<'_, '_> {
         against: &[&[f64]],
         pairs: &[(&[f64], &[f64])],
     ) -> (f64, Vec<f64>) {
-        let projector = self.projector;
-        self.timer.time("coarse problem", || projector.project_with_products(self.space, x, against, pairs))
+        let (partial, width) = self.partial(x, against, pairs);
+        self.timer.time("coarse problem", || self.projector.project_with_sums(x, &partial, width))
     }
 }
 
@@ -151,9 +160,9 @@ impl Projection for DualFace<'_, '_> {
         against: &[&[f64]],
         pairs: &[(&[f64], &[f64])],
     ) -> (f64, Vec<f64>) {
-        let (dual, coarse) = (&self.dual, self.coarse());
-        let project = || self.rows.project_with_products(coarse, dual.space, x, against, pairs);
-        dual.timer.time("coarse problem", project)
+        self.rows.mask(x);
+        let (partial, width) = self.dual.partial(x, against, pairs);
+        self.dual.timer.time("coarse problem", || self.rows.project_with_sums(self.coarse(), x, &partial, width))
     }
 }
 

@@ -158,8 +158,8 @@ pub(super) fn cut(wanted: &scene::Method, bodies: &[BodyMesh]) -> Cut {
         scene::Method::Auto if bodies.iter().all(divides) => Cut::Bricks(boxes),
         scene::Method::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
         scene::Method::Metis { subdomains: None } | scene::Method::Auto => {
-            let tetrahedra = bodies.iter().map(|b| b.counts().elements * b.kind.tetrahedra()).sum();
-            Cut::Metis(cost::subdomains(tetrahedra, bodies.iter().map(|body| body.materials.len()).sum()))
+            let regions = bodies.iter().map(|body| body.materials.len()).sum();
+            Cut::Metis(cost::subdomains(decomposition::tetrahedra(bodies), regions))
         }
     }
 }
