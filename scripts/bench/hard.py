@@ -74,7 +74,8 @@ ELASTIC = "two-blocks-elastic"
 MESHED = "scenes/hard/blocks.toml"
 SLIVERS = "scenes/hard/slivers.toml"
 CORES = "scenes/hard/cores.toml"
-SOFT_CORE = ["material.steel.young=2.1e11", "body.upper.material.upper-core=steel", SOFT]
+SOFT_CORES = ["material.steel.young=2.1e11", SOFT]
+SOFT_CORE = SOFT_CORES + ["body.upper.material.upper-core=steel"]
 METRES = both("material.*.young", 2.1e11) + both("material.*.yield_stress", 4.5e8) + both("material.*.hardening", 1e10)
 METRES += both("body.*.brick.size", "[3.0, 1.0, 1.0]") + ["body.upper.brick.origin=[0.6, 0.0, 1.0]"]
 METRES += ["load.top.traction.2=-1.5e8"]
@@ -92,6 +93,13 @@ SLENDER += ["load.top.traction.2=-0.5", "decomposition.subdomains=12"]
 PRESSED = ["support.top={surface='upper.xmin', fix=['x']}", "load.top={surface='upper.zmax', traction=[0.0, 0.0, -315.0]}"]
 HOMOGENEOUS = -0.5 * 315.0**2 / 210000.0 * 2e9
 
+def layers(begin, thin):
+    """Cells of 100 along z with one of 0.1, at the place given; see scenes/hard/slivers.toml."""
+    return sorted([float(begin + 100 * k) for k in range(11)] + [thin])
+
+
+BESIDE_CONTACT = [f"body.lower.grid.z={layers(0, 999.9)}", f"body.upper.grid.z={layers(1000, 1000.1)}"]
+
 CASES = [
     Case(BENCHMARK, []),
     Case("benchmark, hex8", HEX8),
@@ -108,10 +116,12 @@ CASES = [
     Case(SAME_CORES, [], scene=CORES, beside="benchmark, hex8", same=("from a mesh, hex8", 1.0)),
     Case("cores 1e6 times as stiff, hex8", ["material.core.young=2.1e11", SOFT], scene=CORES, beside=SAME_CORES),
     Case("core 1e6 times as soft, hex8", SOFT_CORE, scene=CORES, beside=SAME_CORES),
+    Case("both cores 1e6 times as soft, one at the contact, hex8", SOFT_CORES, scene=CORES, beside=SAME_CORES),
     Case("beam 1:100 on a block, hex8", HEX8 + SLENDER, scene=ELASTIC),
     Case("plate of one element, 1:150, hex8", HEX8 + PLATE, scene=ELASTIC),
     Case("flat elements 1:25", ["body.upper.brick.size.2=40.0", "load.top.traction.2=-0.1"], scene=ELASTIC),
     Case("slivers 1:1000", [], scene=SLIVERS),
+    Case("slivers 1:1000 on both sides of the contact", BESIDE_CONTACT, scene=SLIVERS),
     Case("contact edge at corners of subdomains", ["decomposition.cells=[6, 5, 5]"], same=(BENCHMARK, 1.0)),
     Case("contact without force", ["load.top.surface=lower.zmax", SOFT]),
     Case("gap 1e-12", ["contact.joint.gap=1e-12"], same=(BENCHMARK, 1.0)),

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::contact::Side;
-use super::{ConstraintError, Constraints, Entry, Row, Support, Term, contact, dirichlet, gluing};
+use super::{ConstraintError, Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, gluing};
 use crate::comm::{Comm, all_gather_u64};
 use crate::contact::ContactPair;
 use crate::decomposition::{Decomposition, InterfaceNode};
@@ -45,6 +45,7 @@ impl Constraints {
             entries: vec![Vec::new(); decomposition.subdomains.len()],
             copies: local_copies(decomposition),
             has_inequalities: !pairs.is_empty(),
+            uneven: stiffness.iter().any(|young| young * JUMP <= largest),
             idle: Vec::new(),
         };
         for key in keys {

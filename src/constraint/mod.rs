@@ -157,6 +157,8 @@ pub struct Constraints {
     pub copies: Vec<Vec<(u32, u32)>>,
     /// Whether any rank has contact rows.
     pub has_inequalities: bool,
+    /// Whether stiffness jumps, and rows may be of unequal length.
+    pub uneven: bool,
     /// Contact pairs of own nodes without a row, because supports fix all of their nodes along the normal, and the distance
     /// that is left (length).
     pub idle: Vec<(usize, f64)>,

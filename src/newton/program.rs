@@ -235,7 +235,7 @@ impl Programs {
             return Ok(Found { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
-        let start = active_set::Start { x: warm.lambda.clone(), residual, kept };
+        let start = active_set::Start { x: warm.lambda.clone(), residual, kept, uneven: problem.constraints.uneven };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let at_floor = self.note(&limits, solution.first_norm);
         let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;

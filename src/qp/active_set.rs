@@ -4,7 +4,9 @@
 //! (the primal-dual active set strategy, Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2002), applied to the dual).
 //! Rows with x_i < 0 are let go; rows outside that show a violated gap (d - A x - G'a)_i > 0 are taken in. The equality
 //! problems are solved loosely: whenever the residual has dropped by a factor the set is looked at, and PCPG goes on
-//! with its directions if the set stands.
+//! with its directions if the set stands. That can be too loose: where stiffness jumps the residual is that of the soft, forces
+//! and gaps of stiff rows may still be all error, and sets wander without coming back. There, and where a correction is much
+//! larger than one before, they are solved to the end before they are corrected.
 //!
 //! No proof of convergence goes with it: sets that come back end as [`Outcome::Cycled`], and the caller turns to
 //! [`super::smalse`]. Unlike there x is not homogenised: bounds are zero and the equalities have a right-hand side,
@@ -16,6 +18,8 @@ use super::{Limits, Outcome, Statistics, axpy};
 
 /// Factor by which the residual drops between two looks at the set.
 const LOOSE: f64 = 0.1;
+/// A correction so many times as large as the smallest so far shows that sets were not known well enough to be corrected.
+const GROWTH: f64 = 2.0;
 /// Sets that may pass.
 const SETS: usize = 60;
 /// A move of x smaller than this, relative to x, is rounding.
@@ -59,16 +63,19 @@ pub struct Start {
     pub residual: Vec<f64>,
     /// The first set, to which the face is restricted already; true for all rows without a bound.
     pub kept: Vec<bool>,
+    /// Whether rows are of unequal length, as where stiffness jumps.
+    pub uneven: bool,
 }
 
 /// Solves the problem. The reference of `limits` is by default the first residual, which at a warm start is too small:
 /// give one there.
 pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Start, limits: &Limits) -> Solution {
-    let Start { x, residual, kept } = start;
+    let Start { x, residual, kept, uneven } = start;
     let n = x.len();
     let mut run = Run {
         space,
         bounded,
+        uneven,
         x: x.clone(),
         residual,
         kept,
@@ -85,6 +92,7 @@ pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: St
 struct Run<'a> {
     space: &'a dyn Space,
     bounded: &'a [bool],
+    uneven: bool,
     x: Vec<f64>,
     residual: Vec<f64>,
     kept: Vec<bool>,
@@ -99,8 +107,9 @@ impl Run<'_> {
     fn iterate(&mut self, face: &mut dyn Face, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
         let mut solver = Pcpg::new(self.space);
         let mut target = None;
-        // Sets seen, and whether sets are solved to the end before they are corrected: so once one has come back.
-        let (mut history, mut strict) = (Vec::new(), false);
+        // Sets seen, and whether sets are solved to the end before they are corrected: so once one has come back, or wanders.
+        let (mut history, mut strict) = (Vec::new(), self.uneven);
+        let mut smallest = f64::INFINITY;
         while history.len() < SETS {
             history.push(self.kept.clone());
             solver.forget();
@@ -110,7 +119,7 @@ impl Run<'_> {
                 self.first_norm = self.projected_norm(face);
             }
             let target = *target.get_or_insert(limits.target(self.first_norm));
-            loop {
+            let changes = loop {
                 let products = limits.products.saturating_sub(self.statistics.hessian);
                 let relative = if strict { 0.0 } else { LOOSE };
                 let loose = Limits { relative, reference: None, absolute: target, drop: 0.0, products };
@@ -119,20 +128,23 @@ impl Run<'_> {
                 if report.outcome != Outcome::Converged {
                     return report.outcome;
                 }
-                if self.correct(face, target) {
-                    break;
+                let changes = self.correct(face, target);
+                if changes > 0.0 {
+                    break changes;
                 }
                 if report.norm <= target {
                     return Outcome::Converged;
                 }
-            }
+            };
             if !face.restrict(&mut self.kept) {
                 return Outcome::Cycled;
             }
-            if self.seen(&history) {
-                if strict {
-                    return Outcome::Cycled;
-                }
+            let (seen, wanders) = (self.seen(&history), changes > GROWTH * smallest);
+            smallest = smallest.min(changes);
+            if seen && strict {
+                return Outcome::Cycled;
+            }
+            if (seen || wanders) && !strict {
                 strict = true;
                 history.clear();
             }
@@ -166,9 +178,9 @@ impl Run<'_> {
         self.space.norm(&self.work)
     }
 
-    /// Lets rows of negative force go and takes rows of violated gap in; true if any rank has changed something. The
-    /// tolerance for gaps only keeps a row of no force and no gap from coming and going.
-    fn correct(&mut self, face: &mut dyn Face, tolerance: f64) -> bool {
+    /// Lets rows of negative force go and takes rows of violated gap in; returns how many, over all ranks. The tolerance for
+    /// gaps only keeps a row of no force and no gap from coming and going.
+    fn correct(&mut self, face: &mut dyn Face, tolerance: f64) -> f64 {
         self.work.copy_from_slice(&self.residual);
         face.gaps(&mut self.work);
         for i in 0..self.x.len() {
@@ -177,7 +189,7 @@ impl Run<'_> {
             self.kept[i] ^= changes;
             self.work[i] = f64::from(changes);
         }
-        self.space.dot(&self.work, &self.work) > 0.0
+        self.space.dot(&self.work, &self.work)
     }
 
     /// Whether the present set has been there before, on all ranks.
@@ -199,7 +211,7 @@ mod tests {
         let bounded = torn.bounded.clone();
         assert!(torn.restrict(&mut kept));
         let residual = torn.f.times(&x).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();
-        solve(&Plain, torn, &bounded, Start { x, residual, kept }, limits)
+        solve(&Plain, torn, &bounded, Start { x, residual, kept, uneven: false }, limits)
     }
 
     #[test]

@@ -119,8 +119,12 @@ fn a_million_times_stiffer_or_softer_core_converges_as_fast() {
     };
     let load = "load.top.traction.2=-30";
     let plain = solved(&[load], 9e7);
-    let soft = ["material.steel.young=2.1e11", "body.upper.material.upper-core=steel"];
-    for jump in [&["material.core.young=2.1e11"][..], &soft] {
+    let around = "material.steel.young=2.1e11";
+    // Two are soft up to the contact: active sets wander where they are corrected too soon.
+    let soft = ["material.core.young=0.21"];
+    for jump in
+        [&["material.core.young=2.1e11"][..], &[around, "body.upper.material.upper-core=steel"], &[around], &soft]
+    {
         let count = solved(&[jump, &[load]].concat(), 9e7);
         assert!(count <= 3.0 * plain, "{jump:?}: {count} applications of F, {plain} without a jump");
     }
