@@ -39,6 +39,7 @@ use crate::feti::preconditioner::{self, Preconditioner};
 use crate::feti::projector::Projector;
 use crate::feti::schur::Schur;
 use crate::feti::space::RowSpace;
+use crate::material::History;
 use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
 use crate::newton::loading::{self, Entry, Observer, Progress};
@@ -119,6 +120,8 @@ pub struct Solved {
     pub u: Torn,
     /// Closed contact pairs whose rows are on this rank, by index.
     pub closed: Vec<u64>,
+    /// What the integration points of each of this rank's subdomains remember; none where nothing ever yielded.
+    pub histories: Vec<Vec<History>>,
 }
 
 /// What a solved scene suggests as the start on a finer mesh of the same bodies. Collective.
@@ -320,5 +323,6 @@ pub fn solve_from(
         convergence: convergence(&summary.newton),
         state,
     };
-    Ok(Solved { summary, piece, records, u: followed.solution.u, closed })
+    let histories = problem.committed.histories;
+    Ok(Solved { summary, piece, records, u: followed.solution.u, closed, histories })
 }

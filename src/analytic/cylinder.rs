@@ -80,6 +80,11 @@ impl CylinderState {
         self.radial_stress(r) + self.intensity / r.max(self.front).powi(2)
     }
 
+    /// Stress along the axis at a radius `r` outside the plastic front: Tresca's would not do inside.
+    pub fn axial_stress(&self, r: f64) -> f64 {
+        self.cylinder.material.poisson * (self.radial_stress(r) + self.hoop_stress(r))
+    }
+
     /// Strains at a radius `r` outside the plastic front: along the radius, and around.
     pub fn strains(&self, r: f64) -> [f64; 2] {
         let Material { young, poisson, .. } = self.cylinder.material;
@@ -150,6 +155,7 @@ mod tests {
                 let m = CYLINDER.material;
                 let stress = m.lambda() * (radial + around) + 2.0 * m.shear_modulus() * radial;
                 assert!((stress - state.radial_stress(r)).abs() < 1e-14);
+                assert!((m.lambda() * (radial + around) - state.axial_stress(r)).abs() < 1e-14);
             }
             assert!((200.0 * state.strains(200.0)[1] - state.outer_displacement()).abs() < 1e-14);
         }

@@ -3,6 +3,7 @@
 //! Between the integration points of an element stresses are interpolated and extrapolated: constant in the linear
 //! tetrahedron, linear in the quadratic one, trilinear in the hexahedron. Volumes likewise.
 
+use crate::element::sample::GAUSS;
 use crate::element::{Kind, hex8, tet10};
 
 /// A point of a rule.
@@ -25,6 +26,14 @@ pub fn squares(kind: Kind) -> Vec<Place> {
         }
         Kind::Tet10 => of_degree_five(kind),
         Kind::Hex8 => gauss(&[(-1.0 / 3_f64.sqrt(), 1.0), (1.0 / 3_f64.sqrt(), 1.0)]),
+    }
+}
+
+/// For functions that elements do not know: of degree five.
+pub fn fine(kind: Kind) -> Vec<Place> {
+    match kind {
+        Kind::Hex8 => gauss(&GAUSS),
+        Kind::Tet4 | Kind::Tet10 => of_degree_five(kind),
     }
 }
 
@@ -73,17 +82,8 @@ fn of_degree_five(kind: Kind) -> Vec<Place> {
 }
 
 #[cfg(test)]
-pub mod tests {
+mod tests {
     use super::*;
-    use crate::element::sample::GAUSS;
-
-    /// For functions that elements do not know.
-    pub fn fine(kind: Kind) -> Vec<Place> {
-        match kind {
-            Kind::Hex8 => gauss(&GAUSS),
-            _ => of_degree_five(kind),
-        }
-    }
 
     /// Integrals of barycentric monomials over a tetrahedron of volume 1: 3! a! b! c! d! / (3 + a + b + c + d)!.
     #[test]

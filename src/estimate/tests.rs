@@ -1,4 +1,3 @@
-use super::rule::tests::fine;
 use super::*;
 use crate::assembly::orders;
 use crate::comm::{Shares, solo::Solo};
@@ -15,13 +14,10 @@ fn errors(whole: &Subdomain, u: Vec<f64>, exact: &dyn Fn([f64; 3]) -> Voigt) -> 
     let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
     let part = Part { subdomain: whole, material: &orders::MATERIAL, history: &[] };
     let c = orders::MATERIAL.elastic_tangent();
-    let at = |nodes: &[u32], values: &[f64]| {
-        let along = |i: usize| nodes.iter().zip(values).map(|(&n, value)| value * whole.points[n as usize][i]).sum();
-        apply(&c, &exact(std::array::from_fn(along)))
-    };
-    let found: f64 = part.squares(&part.samples(&u), &fine(whole.elements.kind()), at).iter().sum();
-    let estimated: f64 = estimate(&NodeSums::new(&Solo, &alone), &[part], &vec![u]).errors[0].iter().sum();
-    [estimated.sqrt(), found.sqrt()]
+    let u = vec![u];
+    let found = error(&[part], &u, |_, x| apply(&c, &exact(x)));
+    let estimated = estimate(&NodeSums::new(&Solo, &alone), &[part], &u);
+    [estimated, found].map(|Estimate { errors, .. }| errors[0].iter().sum::<f64>().sqrt())
 }
 
 fn effectivity([estimated, error]: [f64; 2]) -> f64 {

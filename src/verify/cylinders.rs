@@ -1,8 +1,8 @@
 //! A thick cylinder in plane strain under pressure: elastic, and perfectly plastic in increments.
 
-use super::radial::Radial;
+use super::radial::{Radial, State};
 use super::run::Run;
-use super::{Case, Demand, Error, material_line, orders};
+use super::{Case, Demand, Error, effectivity, material_line, orders};
 use crate::analytic::cylinder::{Cylinder, CylinderState};
 use crate::material::Material;
 use crate::scene::Element;
@@ -95,12 +95,18 @@ impl Case for Pressed {
             let demand = if run.element() == Element::Tet4 { Demand::Shown } else { Demand::Finest(BIAS) };
             return vec![Error::new("outer radius", at_outer, demand)];
         }
-        let exact = |_, r: f64| (r * state.strains(r)[1], state.strains(r));
-        let [energy, displacement] = run.norms(&Radial { about_axis: true, state: exact });
+        let at = |_, r: f64| {
+            let (strain, stress) =
+                (state.strains(r), [state.radial_stress(r), state.hoop_stress(r), state.axial_stress(r)]);
+            State { displacement: r * strain[1], strain, stress }
+        };
+        let exact = Radial { about_axis: true, state: at };
+        let [energy, displacement] = run.norms(&exact);
         let demands = orders(run.element(), false);
         vec![
             Error::new("energy norm", energy, demands[0]),
             Error::new("displacement", displacement, demands[1]),
+            effectivity(run, &exact),
             Error::new("outer radius", at_outer, Demand::Shown),
         ]
     }

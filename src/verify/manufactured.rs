@@ -1,7 +1,7 @@
 //! Manufactured solutions on the unit cube: orders of all elements where the solution is smooth, and at a plastic front.
 
 use super::run::{Exact, Run};
-use super::{Case, Demand, Error, material_line, orders};
+use super::{Case, Demand, Error, effectivity, material_line, orders};
 use crate::analytic::manufactured::Manufactured;
 use crate::material::Material;
 use crate::scene::Element;
@@ -67,6 +67,10 @@ impl Exact for Manufactured {
     fn strain(&self, _: usize, x: [f64; 3]) -> Voigt {
         Manufactured::strain(self, x)
     }
+
+    fn stress(&self, _: usize, x: [f64; 3]) -> Voigt {
+        Manufactured::stress(self, x)
+    }
 }
 
 impl Case for Smooth {
@@ -116,8 +120,11 @@ impl Case for Smooth {
     fn errors(&self, run: &Run) -> Vec<Error> {
         let [energy, displacement] = run.norms(self.solution);
         let demands = orders(run.element(), self.has_front);
-        let mut errors =
-            vec![Error::new("energy norm", energy, demands[0]), Error::new("displacement", displacement, demands[1])];
+        let mut errors = vec![
+            Error::new("energy norm", energy, demands[0]),
+            Error::new("displacement", displacement, demands[1]),
+            effectivity(run, self.solution),
+        ];
         if self.solution.material.yield_stress.is_some() {
             let kappa = run.cells("equivalent_plastic_strain", |_, x| self.solution.kappa(x));
             errors.push(Error::new("plastic strain", kappa, Demand::Shown));

@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 use crate::scene::Element;
 
-/// What must hold of an error on the finest mesh.
+/// What must hold of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Demand {
@@ -16,6 +16,8 @@ pub enum Demand {
     Order(f64),
     /// At least this large on the finest mesh: what the element is known to miss.
     Missed(f64),
+    /// It is no error, but a ratio between these, on every mesh.
+    Between(f64, f64),
     /// Nothing; it is shown.
     Shown,
 }
@@ -25,7 +27,7 @@ pub enum Demand {
 pub struct Error {
     /// What is wrong by so much.
     pub name: &'static str,
-    /// Relative to the size of what is compared; negative where less was found.
+    /// Relative to the size of what is compared; negative where less was found. Or a ratio.
     pub value: f64,
     /// What must hold.
     pub demand: Demand,
@@ -114,6 +116,13 @@ impl Measured {
             Demand::Below(bound) => (worst <= bound, format!("{worst:.1e} on the worst mesh, at most {bound:.1e}")),
             Demand::Finest(bound) => (value.abs() <= bound, format!("{:.2e}, at most {bound:.1e}", value.abs())),
             Demand::Missed(bound) => (value.abs() >= bound, format!("{:.2e}, at least {bound:.1e}", value.abs())),
+            Demand::Between(low, high) => {
+                let values = || self.rows.iter().map(|row| row.errors[index].value);
+                let (least, most) = (values().fold(value, f64::min), values().fold(value, f64::max));
+                // Not a number is not between.
+                let met = values().all(|value| (low..=high).contains(&value));
+                (met, format!("{least:.2} to {most:.2}, between {low} and {high}"))
+            }
             Demand::Order(wanted) => match self.order(last, index) {
                 Some(order) => (order >= wanted - ORDER_TOLERANCE, format!("order {order:.2}, wanted {wanted}")),
                 None => (false, "an order needs two meshes".to_owned()),
@@ -138,6 +147,9 @@ impl Measured {
         let last = self.rows.len() - 1;
         let Row { level, nodes, hessian_multiplications: products, seconds, errors, .. } = &self.rows[last];
         let error = |(index, error): (usize, &Error)| {
+            if let Demand::Between(..) = error.demand {
+                return format!("{:>24}", format!("{:.2}", error.value));
+            }
             let order = self.order(last, index).filter(|_| error.value.abs() > ROUNDING);
             let order = order.map_or(String::new(), |order| format!(" ({order:.2})"));
             format!("{:>24}", format!("{:.2e}{order:>8}", error.value))
@@ -186,6 +198,10 @@ mod tests {
             (&[f64::NAN], Demand::Finest(1.0), false),
             (&[1e-3, 0.5], Demand::Missed(0.2), true),
             (&[0.5, 0.1], Demand::Missed(0.2), false),
+            (&[0.5, 2.0], Demand::Between(0.5, 2.0), true),
+            (&[2.1, 1.0], Demand::Between(0.5, 2.0), false),
+            (&[1.0, 0.4], Demand::Between(0.5, 2.0), false),
+            (&[f64::NAN, 1.0], Demand::Between(0.5, 2.0), false),
             (&[f64::NAN], Demand::Shown, true),
         ] {
             let measured = measured(values, demand);

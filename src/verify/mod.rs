@@ -22,6 +22,7 @@ use crate::material::Material;
 use crate::scene::{Element, Scene, SceneError};
 use crate::study::StudyError;
 pub use measured::{Demand, Error, Measured, Row, Verdict};
+use run::Exact;
 pub use run::Run;
 
 /// A scene with a known solution.
@@ -152,6 +153,11 @@ fn orders(element: Element, has_front: bool) -> [Demand; 2] {
         (Element::Tet4 | Element::Hex8, true) => [1.0, 1.5],
     }
     .map(Demand::Order)
+}
+
+/// The error estimate over the error.
+fn effectivity(run: &Run, exact: &dyn Exact) -> Error {
+    Error::new("effectivity", run.effectivity(exact), Demand::Between(0.5, 2.0))
 }
 
 /// Elements in the order of the report.

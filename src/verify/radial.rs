@@ -3,15 +3,38 @@
 use super::run::Exact;
 use crate::tensor::Voigt;
 
-/// Displacement along the radius, and strains: along the radius, around, along the axis.
+/// A field about the origin or the z axis.
 pub struct Radial<F> {
     /// Whether distances are those from the z axis, not from the origin.
     pub about_axis: bool,
-    /// Displacement outwards, strain along the radius, strain around; of a body at a distance.
+    /// What is in a body at a distance.
     pub state: F,
 }
 
-impl<F: Fn(usize, f64) -> (f64, [f64; 2])> Radial<F> {
+/// What is at a distance.
+pub struct State {
+    /// Outwards.
+    pub displacement: f64,
+    /// Along the radius, and around; none along the z axis.
+    pub strain: [f64; 2],
+    /// Along the radius, around, and along the z axis if the field is about it.
+    pub stress: [f64; 3],
+}
+
+/// A symmetric tensor with these components along the radius, around, and along the rest, its shears once.
+fn tensor(n: [f64; 3], [radial, around, rest]: [f64; 3]) -> Voigt {
+    let more = radial - around;
+    [
+        around + more * n[0] * n[0],
+        around + more * n[1] * n[1],
+        rest + more * n[2] * n[2],
+        more * n[0] * n[1],
+        more * n[1] * n[2],
+        more * n[2] * n[0],
+    ]
+}
+
+impl<F: Fn(usize, f64) -> State> Radial<F> {
     fn arm(&self, [x, y, z]: [f64; 3]) -> ([f64; 3], f64) {
         let arm = [x, y, if self.about_axis { 0.0 } else { z }];
         let length = arm.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -19,38 +42,59 @@ impl<F: Fn(usize, f64) -> (f64, [f64; 2])> Radial<F> {
     }
 }
 
-impl<F: Fn(usize, f64) -> (f64, [f64; 2])> Exact for Radial<F> {
+impl<F: Fn(usize, f64) -> State> Exact for Radial<F> {
     fn displacement(&self, body: usize, x: [f64; 3]) -> [f64; 3] {
         let (n, r) = self.arm(x);
-        let (outwards, _) = (self.state)(body, r);
-        n.map(|n| outwards * n)
+        let State { displacement, .. } = (self.state)(body, r);
+        n.map(|n| displacement * n)
     }
 
     fn strain(&self, body: usize, x: [f64; 3]) -> Voigt {
         let (n, r) = self.arm(x);
-        let (_, [radial, around]) = (self.state)(body, r);
-        let more = radial - around;
-        let along_axis = if self.about_axis { 0.0 } else { around };
-        [
-            around + more * n[0] * n[0],
-            around + more * n[1] * n[1],
-            along_axis + more * n[2] * n[2],
-            2.0 * more * n[0] * n[1],
-            2.0 * more * n[1] * n[2],
-            2.0 * more * n[2] * n[0],
-        ]
+        let State { strain: [radial, around], .. } = (self.state)(body, r);
+        let [x, y, z, xy, yz, zx] = tensor(n, [radial, around, if self.about_axis { 0.0 } else { around }]);
+        [x, y, z, 2.0 * xy, 2.0 * yz, 2.0 * zx]
+    }
+
+    fn stress(&self, body: usize, x: [f64; 3]) -> Voigt {
+        let (n, r) = self.arm(x);
+        tensor(n, (self.state)(body, r).stress)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::{History, Material};
+
+    const STEEL: Material = Material::elastic(1.0, 0.3);
+
+    /// Moves by the square of the distance; with Hooke's stress.
+    fn state(r: f64, about_axis: bool) -> State {
+        let strain = [2.0 * r, r, if about_axis { 0.0 } else { r }];
+        let along = |k: usize| STEEL.lambda() * strain.iter().sum::<f64>() + 2.0 * STEEL.shear_modulus() * strain[k];
+        State { displacement: r * r, strain: [2.0 * r, r], stress: [along(0), along(1), along(2)] }
+    }
+
+    /// Turned with the strain.
+    #[test]
+    fn stresses_are_those_of_the_strain() {
+        for about_axis in [false, true] {
+            let field = Radial { about_axis, state: |_, r: f64| state(r, about_axis) };
+            for x in [[1.0, 2.0, 3.0], [0.5, -0.2, 0.1]] {
+                let expected = STEEL.respond(&field.strain(0, x), &History::default()).stress;
+                for (a, b) in field.stress(0, x).iter().zip(expected) {
+                    assert!((a - b).abs() < 1e-13, "{a} {b}");
+                }
+            }
+        }
+    }
 
     /// By differences of the displacement.
     #[test]
     fn strains_are_those_of_the_displacement() {
         for about_axis in [false, true] {
-            let field = Radial { about_axis, state: |_, r: f64| (r * r, [2.0 * r, r]) };
+            let field = Radial { about_axis, state: |_, r: f64| state(r, about_axis) };
             for x in [[1.0, 2.0, 3.0], [0.5, -0.2, 0.1]] {
                 let at = |axis: usize, step: f64| {
                     field.displacement(0, std::array::from_fn(|i| x[i] + if i == axis { step } else { 0.0 }))

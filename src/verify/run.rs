@@ -6,6 +6,7 @@ use crate::comm::{Comm, maximum, ordered_sum};
 use crate::contact::ContactPair;
 use crate::decomposition::Subdomain;
 use crate::element::sample::{Sample, samples};
+use crate::estimate::{self, Estimate, Part};
 use crate::monitor::timing::Timer;
 use crate::results::summary::Summary;
 use crate::scene::{Element, Scene};
@@ -28,6 +29,8 @@ pub trait Exact {
     fn displacement(&self, body: usize, x: [f64; 3]) -> [f64; 3];
     /// Strain (engineering shears) at a place.
     fn strain(&self, body: usize, x: [f64; 3]) -> Voigt;
+    /// Stress at a place.
+    fn stress(&self, body: usize, x: [f64; 3]) -> Voigt;
 }
 
 impl<'a> Run<'a> {
@@ -102,6 +105,28 @@ impl<'a> Run<'a> {
             sums
         });
         [(sums[0] / sums[1]).sqrt(), (sums[2] / sums[3]).sqrt()]
+    }
+
+    /// Estimated error of the stress over the true one, see [`crate::estimate`]. Collective.
+    pub fn effectivity(&self, exact: &dyn Exact) -> f64 {
+        let Discrete { decomposition, materials, .. } = &self.discrete;
+        let subdomains = &decomposition.subdomains;
+        let histories = |own: usize| self.solved.histories.get(own).map_or(&[][..], Vec::as_slice);
+        let parts: Vec<Part> = subdomains
+            .iter()
+            .enumerate()
+            .map(|(own, subdomain)| Part {
+                subdomain,
+                material: &materials[subdomain.material],
+                history: histories(own),
+            })
+            .collect();
+        let Estimate { errors, stresses } =
+            estimate::error(&parts, &self.solved.u, |own, x| exact.stress(subdomains[own].body, x));
+        let partial: Vec<f64> = errors.iter().zip(stresses).flat_map(|(e, s)| [e.iter().sum(), s]).collect();
+        let sum = ordered_sum(self.comm, &decomposition.shares, &partial, 2);
+        let estimated = self.summary().state.errors.discretisation.unwrap_or(f64::NAN);
+        estimated / (sum[0] / sum[1]).sqrt()
     }
 
     /// Largest error of the displacement of a node, relative to the largest displacement of the closed form. Collective.

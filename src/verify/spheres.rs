@@ -1,9 +1,9 @@
 //! Hollow spheres under pressure: one, elastic, yielding, and unloaded again; and two with a gap between them.
 
-use super::radial::Radial;
+use super::radial::{Radial, State};
 use super::run::{Run, pressure_error};
-use super::{Case, Demand, Error, PAPER, material_line, orders};
-use crate::analytic::hollow_sphere::{HollowSphere, SphereState};
+use super::{Case, Demand, Error, PAPER, effectivity, material_line, orders};
+use crate::analytic::hollow_sphere::{HollowSphere, SphereState, Unloaded};
 use crate::analytic::nested_spheres::NestedSpheres;
 use crate::material::{History, Material};
 use crate::scene::Element;
@@ -82,15 +82,16 @@ impl Case for Hollow {
 
     fn errors(&self, run: &Run) -> Vec<Error> {
         let loaded = self.loaded();
-        let [energy, displacement] = if self.unloaded {
-            let left = loaded.unloaded().expect("nothing yields on the way back");
-            run.norms(&Radial { about_axis: false, state: |_, r| (left.displacement(r), left.strains(r)) })
-        } else {
-            run.norms(&Radial { about_axis: false, state: |_, r| (loaded.displacement(r), loaded.strains(r)) })
-        };
+        let left = self.unloaded.then(|| loaded.unloaded().expect("nothing yields on the way back"));
+        let state = |_, r| left.as_ref().map_or_else(|| under_pressure(&loaded, r), |left| without_pressure(left, r));
+        let exact = Radial { about_axis: false, state };
+        let [energy, displacement] = run.norms(&exact);
         let demands = orders(run.element(), !self.is_elastic());
-        let mut errors =
-            vec![Error::new("energy norm", energy, demands[0]), Error::new("displacement", displacement, demands[1])];
+        let mut errors = vec![
+            Error::new("energy norm", energy, demands[0]),
+            Error::new("displacement", displacement, demands[1]),
+            effectivity(run, &exact),
+        ];
         if !self.is_elastic() {
             let kappa = run.cells("equivalent_plastic_strain", |_, x| loaded.kappa(distance(x)));
             errors.push(Error::new("plastic strain", kappa, Demand::Shown));
@@ -100,6 +101,17 @@ impl Case for Hollow {
         }
         errors
     }
+}
+
+fn under_pressure(state: &SphereState, r: f64) -> State {
+    let around = state.hoop_stress(r);
+    let stress = [state.radial_stress(r), around, around];
+    State { displacement: state.displacement(r), strain: state.strains(r), stress }
+}
+
+fn without_pressure(state: &Unloaded, r: f64) -> State {
+    let [radial, around] = state.stresses(r);
+    State { displacement: state.displacement(r), strain: state.strains(r), stress: [radial, around, around] }
 }
 
 pub(super) fn distance(x: [f64; 3]) -> f64 {
@@ -165,9 +177,9 @@ impl Case for Nested {
 
     fn errors(&self, run: &Run) -> Vec<Error> {
         let exact = NESTED.loaded(PRESSURE).expect("no wall yields through");
-        let of = |body| if body == 0 { exact.inner } else { exact.outer };
-        let state = |body, r| (of(body).displacement(r), of(body).strains(r));
-        let [energy, displacement] = run.norms(&Radial { about_axis: false, state });
+        let of = |body| if body == 0 { &exact.inner } else { &exact.outer };
+        let field = Radial { about_axis: false, state: |body, r| under_pressure(of(body), r) };
+        let [energy, displacement] = run.norms(&field);
         let [first, second] = orders(run.element(), true);
         let interface = SPHERE.outer;
         let at_interface = run.nodes(
@@ -178,6 +190,7 @@ impl Case for Nested {
         vec![
             Error::new("energy norm", energy, first),
             Error::new("displacement", displacement, second),
+            effectivity(run, &field),
             Error::new("interface moved", at_interface, closed),
             Error::new("contact pressure", pressure_error(&run.contacts(), |_| exact.contact_pressure), closed),
             Error::new("plastic front", front(run, exact.inner.front()), of_front(run)),
