@@ -20,16 +20,19 @@ def write(contents, command, only_check):
     return 0
 
 
-def run_or_write(description, command, kind, run, contents):
-    """A script's commands: `run(names, ranks)` measures some or all of a kind, what `contents()` gives is written."""
+def run_or_write(description, command, kind, run, contents, switches=()):
+    """A script's commands: `run(names, ranks)` measures some or all of a kind, what `contents()` gives is written. `switches`: more
+    that `run` wants to know, with help."""
     parser = argparse.ArgumentParser(description=description)
     commands = parser.add_subparsers(dest="command", required=True)
     running = commands.add_parser("run", help="measure")
     running.add_argument("names", nargs="*", metavar=kind)
     running.add_argument("--np", type=int, default=2)
+    for name, text in dict(switches).items():
+        running.add_argument(f"--{name}", action="store_true", help=text)
     writing = commands.add_parser("write", help="make the page from the runs there are")
     writing.add_argument("--check", action="store_true", help="write nothing; fail if something would change")
     arguments = parser.parse_args()
     if arguments.command == "write":
         return write(contents(), f"{command} write", arguments.check)
-    return run(arguments.names, arguments.np)
+    return run(arguments.names, arguments.np, **{name: getattr(arguments, name) for name in dict(switches)})

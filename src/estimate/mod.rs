@@ -19,7 +19,9 @@
 //! It is an estimate, no bound: nearly exact for smooth solutions, and blind to what the mesh does not resolve at all. Measured
 //! over the true error (`tests`), from meshes that hardly resolve the solution to fine ones: waves 1.45 to 1.02 with linear
 //! tetrahedra, 1.33 to 1.06 with hexahedra, 0.84 to 1.02 with quadratic tetrahedra; a sector of a hollow sphere 1.18 to 0.99, 1.53
-//! to 0.96, 0.95 to 1.07; bending 1.00.
+//! to 0.96, 0.95 to 1.07; bending 1.00. `fetiplast verify` measures it through the whole program, for plastic states and contact
+//! too. At a plastic front the stress has a kink: quadratic tetrahedra have a small error if faces lie along it, and the estimate,
+//! whose patches know nothing of that, is rather too large; if elements lie across it, rather too small.
 
 mod polynomial;
 mod recovery;

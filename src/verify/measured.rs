@@ -52,6 +52,10 @@ pub struct Row {
     pub subdomains: u64,
     pub newton_iterations: u64,
     pub hessian_multiplications: u64,
+    /// Displacements of the torn problem.
+    pub primal_dofs: u64,
+    /// What the dual operator and the preconditioner read of factors, all ranks together (1e9 bytes).
+    pub gigabytes: f64,
     /// Wall time, discretisation included.
     pub seconds: f64,
     /// Whether the run ended as it must.
@@ -175,6 +179,8 @@ mod tests {
             subdomains: 0,
             newton_iterations: 0,
             hessian_multiplications: 0,
+            primal_dofs: 0,
+            gigabytes: 0.0,
             seconds: 0.0,
             ended_well: true,
             message: None,

@@ -7,6 +7,7 @@ use crate::contact::ContactPair;
 use crate::decomposition::Subdomain;
 use crate::element::sample::{Sample, samples};
 use crate::estimate::{self, Estimate, Part};
+use crate::monitor::table::PhaseTable;
 use crate::monitor::timing::Timer;
 use crate::results::summary::Summary;
 use crate::scene::{Element, Scene};
@@ -21,6 +22,7 @@ pub struct Run<'a> {
     comm: &'a dyn Comm,
     scene: Scene,
     seconds: f64,
+    gigabytes: f64,
 }
 
 /// A displacement field of closed form; the body is named by its index.
@@ -45,7 +47,11 @@ impl<'a> Run<'a> {
             discrete.loads[0] = Load::Field { body: 0, value, factor: 1.0 };
         }
         let solved = study::solve(&scene, &discrete, comm, None, &timer, &mut |_| {})?;
-        Ok(Self { level, discrete, solved, comm, scene, seconds: timer.total_seconds() })
+        let seconds = timer.total_seconds();
+        let work = PhaseTable::gather(comm, &timer).work();
+        let read = |phase: &str| work.get(phase).map_or(0.0, |work| work.bytes) / 1e9;
+        let gigabytes = read("dual operator") + read("preconditioner");
+        Ok(Self { level, discrete, solved, comm, scene, seconds, gigabytes })
     }
 
     /// Numbers of the run.
@@ -68,6 +74,8 @@ impl<'a> Run<'a> {
             subdomains: sizes.subdomains,
             newton_iterations: newton_iterations.unwrap_or_default(),
             hessian_multiplications: counters.hessian_multiplications.unwrap_or_default(),
+            primal_dofs: sizes.primal_dofs,
+            gigabytes: self.gigabytes,
             seconds: self.seconds,
             ended_well: end == End::Either || *converged == Some(end == End::Reached),
             message: error.clone(),
