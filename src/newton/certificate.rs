@@ -11,14 +11,16 @@
 //! Subtracted from `J(u)` of an admissible `u`, that is
 //!
 //! ```text
-//! J(u) - min J <= gap = lambda_I'(c - B u)_I  +  [Psi(u) - Psi(v) - F(v)'(u - v)]  +  sum_s rho_s'K_s^+ rho_s / 2 r_s
+//! J(u) - min J <= gap = lambda_I'(c - B u)_I  +  [Psi(u) - Psi(v) - F(v)'(u - v)]  +  max(0, rho'(v - u))
+//!                       +  sum_s rho_s'K_s^+ rho_s / 2 r_s
 //! ```
 //!
 //! where every term is positive and is computed without cancellation, and where `K_s` may be any tangent, as tangents are at
-//! most `K_e` and so `K_e^+` is at most `K_s^+` on forces in balance. We start from `v = u`, where the bracket is zero, and
-//! let `v = v + K^+ rho`: Newton's method for the torn bodies under the forces `lambda`, whose `rho` vanishes quadratically, so
-//! that the gap tends to the true duality gap of `u` and `lambda`. In linear elasticity (`r = 1`, `K = K_e`) the first value is
-//! that already. Each turn costs one `K^+` and no conjugate gradients; there are four at most, and the least value counts.
+//! most `K_e` and so `K_e^+` is at most `K_s^+` on forces in balance. We start from `v = u`, where only the first and the last
+//! are not zero, and let `v = v + K^+ rho`: Newton's method for the torn bodies under the forces `lambda`, whose `rho` vanishes
+//! quadratically, so that the gap tends to the true duality gap of `u` and `lambda`. In linear elasticity (`r = 1`, `K = K_e`)
+//! the first value is that already. Each turn costs one `K^+` and no conjugate gradients; there are four at most, and the least
+//! value counts.
 //!
 //! The gap bounds the error of the stress without a constant, and that of the displacement with one:
 //!
@@ -98,7 +100,7 @@ impl StepSolver<'_> {
         for solves in 1..=TURNS {
             let mut correction = rho.clone();
             timer.time("certificate", || self.operator.factors.solve(&mut correction));
-            let mut partial = Vec::with_capacity(3 * u.len());
+            let mut partial = Vec::with_capacity(4 * u.len());
             timer.time("certificate", || {
                 for (own, subdomain) in problem.subdomains.iter().enumerate() {
                     let (material, history) = (&problem.materials[own], problem.committed.history(own));
@@ -107,13 +109,15 @@ impl StepSolver<'_> {
                     } else {
                         internal::divergence(subdomain, material, history, &v[own], &change[own])
                     };
+                    let worked = -dot(&rho[own], &change[own]);
                     let square = (1.0 + FACTORS) * dot(&rho[own], &correction[own]);
                     let weighted = if square > 0.0 { square / material.least_tangent() } else { 0.0 };
-                    partial.extend([moved, square, weighted]);
+                    partial.extend([moved, worked, square, weighted]);
                 }
             });
-            let sum = problem.space.sum(&partial, 3);
-            let (least, most) = (open + sum[0] + 0.5 * sum[1], open + sum[0] + 0.5 * sum[2]);
+            let sum = problem.space.sum(&partial, 4);
+            let known = open + sum[0] + sum[1].max(0.0);
+            let (least, most) = (known + 0.5 * sum[2], known + 0.5 * sum[3]);
             best.solves = solves;
             best.gap = best.gap.min(most);
             estimate = least;
