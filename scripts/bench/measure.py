@@ -94,9 +94,10 @@ def solve(program, run, folder):
         summary = pathlib.Path(out) / "summary.json"
         start = [*program.launch, "-n", str(run.ranks)]
         command = [*start, str(program.path), "solve", *options, "--out", out, "--summary", str(summary)]
-        watch = time.monotonic()
+        watch, before = time.monotonic(), processor_time()
         done = subprocess.run(command, env=program.environment, capture_output=True, text=True)
         seconds = time.monotonic() - watch
+        taken, passed = (after - earlier for after, earlier in zip(processor_time(), before))
         found = read_summary(summary)
     if done.returncode:
         print(done.stdout + done.stderr, file=sys.stderr)
@@ -108,6 +109,7 @@ def solve(program, run, folder):
             "command": shlex.join([*start, "fetiplast", "solve", *options]),
             "date": f"{started:%Y-%m-%dT%H:%M:%SZ}",
             "load_average": load,
+            "stolen": taken / passed if passed else 0.0,
         },
     }
 
@@ -156,6 +158,15 @@ def circumstances(environment):
         "memory_mb": os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") >> 20,
         "system": f"{platform.system()} {platform.machine()}",
     }
+
+
+def processor_time():
+    """What a hypervisor gave to others while there was work here, and all of the cores' time; in ticks, 0 where nobody counts."""
+    try:
+        ticks = [int(word) for word in pathlib.Path("/proc/stat").read_text().split("\n")[0].split()[1:9]]
+        return ticks[7], sum(ticks)
+    except (OSError, IndexError, ValueError):
+        return 0, 0
 
 
 def cpu():

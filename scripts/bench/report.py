@@ -403,14 +403,16 @@ def circumstances(groups):
             p = record["provenance"]
             commit = p["commit"][:12] + (" (with uncommitted changes)" if p["dirty"] else "")
             where = f"{p['cores']} cores of {p['cpu']}, {p['memory_mb'] / 1024:.0f} GiB, {p['rustc']}, {p['mpi']}"
-            found.setdefault((commit, where), []).append((p["date"], p["load_average"]))
+            found.setdefault((commit, where), []).append((p["date"], p["load_average"], p.get("stolen")))
     lines = []
-    for (commit, where), runs in sorted(found.items(), key=lambda item: max(item[1])):
-        busiest = max(load for _, load in runs)
-        lines.append(
-            f"- commit {commit}, {min(runs)[0][:10]}, {len(runs)} runs on {where}; load average before a run at most "
-            f"{busiest:.1f}."
-        )
+    for (commit, where), runs in sorted(found.items(), key=lambda item: max(run[0] for run in item[1])):
+        busiest = max(load for _, load, _ in runs)
+        first = min(date for date, _, _ in runs)[:10]
+        line = f"- commit {commit}, {first}, {len(runs)} runs on {where}; load average before a run at most {busiest:.1f}"
+        stolen = [share for _, _, share in runs if share is not None]
+        if stolen:
+            line += f"; a hypervisor kept {100 * min(stolen):.1f} to {100 * max(stolen):.1f} % of the cores' time from a run"
+        lines.append(line + ".")
     return "\n".join(lines) + "\n"
 
 
