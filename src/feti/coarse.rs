@@ -167,7 +167,7 @@ impl<'a> Coarse<'a> {
     /// Collective.
     pub fn blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
         let [equalities, inequalities] = &self.acting;
-        let constant = || self.products(equalities, |_| true).collect();
+        let constant = || self.products(equalities, |_| true).into_iter().collect();
         let mut blocks: Blocks = self.equalities.get_or_init(constant).clone();
         for (place, product) in self.products(inequalities, kept) {
             let block = blocks.entry(place).or_insert([0.0; MODES * MODES]);
@@ -203,7 +203,7 @@ impl<'a> Coarse<'a> {
         &self,
         acting: &[Vec<Acting>],
         kept: impl Fn(usize) -> bool,
-    ) -> impl Iterator<Item = ((usize, usize), [f64; MODES * MODES])> {
+    ) -> Vec<((usize, usize), [f64; MODES * MODES])> {
         let first = self.clusters.shares.begin(self.comm.rank());
         let mut message = Vec::new();
         for (cluster, acting) in (first..).zip(acting) {
@@ -230,8 +230,9 @@ impl<'a> Coarse<'a> {
                 message.extend(block.map(f64::to_bits));
             }
         }
-        let all = all_gather_u64(self.comm, &message).as_chunks::<{ 2 + MODES * MODES }>().0.to_vec();
-        all.into_iter().map(|[row, column, block @ ..]| ((row as usize, column as usize), block.map(f64::from_bits)))
+        let all = all_gather_u64(self.comm, &message);
+        let blocks = all.as_chunks::<{ 2 + MODES * MODES }>().0.iter();
+        blocks.map(|&[row, column, block @ ..]| ((row as usize, column as usize), block.map(f64::from_bits))).collect()
     }
 
     fn slots(&self, row: usize) -> std::ops::Range<usize> {
