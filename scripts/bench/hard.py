@@ -57,6 +57,11 @@ def axes(order):
     return sets + [f"load.top.surface=upper.{z}max", f"contact.joint.slave=upper.{z}min", f"contact.joint.master=lower.{z}max"]
 
 
+def layers(begin, thin):
+    """Cells of 100 along z, one of them cut in two at the place given; see scenes/hard/slivers.toml."""
+    return sorted([float(begin + 100 * k) for k in range(11)] + [thin])
+
+
 def turned(vector, axis, degrees):
     """Rodrigues' formula."""
     length = math.sqrt(sum(a * a for a in axis))
@@ -92,12 +97,6 @@ SLENDER += ["load.top.traction.2=-0.5", "decomposition.subdomains=12"]
 # A homogeneous state: the support of the top is given to a side that is held already.
 PRESSED = ["support.top={surface='upper.xmin', fix=['x']}", "load.top={surface='upper.zmax', traction=[0.0, 0.0, -315.0]}"]
 HOMOGENEOUS = -0.5 * 315.0**2 / 210000.0 * 2e9
-
-def layers(begin, thin):
-    """Cells of 100 along z with one of 0.1, at the place given; see scenes/hard/slivers.toml."""
-    return sorted([float(begin + 100 * k) for k in range(11)] + [thin])
-
-
 BESIDE_CONTACT = [f"body.lower.grid.z={layers(0, 999.9)}", f"body.upper.grid.z={layers(1000, 1000.1)}"]
 
 CASES = [

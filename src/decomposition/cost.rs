@@ -22,9 +22,10 @@ const DEAR: f64 = 52.0;
 /// Numbers that could be read in the time that each subdomain takes besides.
 const OVERHEAD: f64 = 500.0;
 
-/// Subdomains in a cluster, of so many linear tetrahedra in all: blocks of one, two or three along each edge. Larger ones leave a
-/// smaller coarse problem, make K^+ dearer and take more iterations: they pay where the coarse problem takes about twice the time of F, by the
-/// counts of numbers above. Constants are from the benchmark in 48 to 20,250 boxes of 2, 4, 5 and 10 cells an edge.
+/// Subdomains in a cluster, of so many linear tetrahedra in all: blocks of one, two or three along each edge. Larger ones
+/// leave a smaller coarse problem, make K^+ dearer and take more iterations: they pay where the coarse problem takes about
+/// twice the time of F, by the counts of numbers above. Constants are from the benchmark in 48 to 20,250 boxes of 2, 4, 5 and
+/// 10 cells an edge.
 pub fn cluster(subdomains: usize, tetrahedra: u64) -> usize {
     let count = subdomains as f64;
     let nodes = ((tetrahedra as f64 / (6.0 * count)).cbrt() + 1.0).powi(3);
