@@ -7,7 +7,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use crate::common::fields::Fields;
-use crate::common::{End, children, run_disturbed, run_in_small_room, send};
+use crate::common::{End, children, on_one_machine, run_disturbed, run_in_small_room, send};
 use fetiplast::comm::Comm;
 use fetiplast::comm::world::World;
 
@@ -110,8 +110,7 @@ fn a_rank_that_panics_ends_all_ranks() {
     let test = ["--ignored", "--exact", "faults::panic_on_the_last_rank", "--nocapture", "--test-threads", "1"];
     let mut mpirun = Command::new("timeout");
     mpirun.args(["60", "mpirun", "-np", "3"]).arg(this).args(test);
-    mpirun.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
-    mpirun.env("OMPI_MCA_rmaps_base_oversubscribe", "1");
+    on_one_machine(&mut mpirun);
     let output = mpirun.output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(70), "{stderr}");

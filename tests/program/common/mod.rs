@@ -247,11 +247,8 @@ fn prepare(ranks: usize, arguments: &[&str], directory: &Path) -> (Command, [Pat
     if ranks > 1 {
         command.args(["-np", &ranks.to_string(), program]);
     }
-    command.args(arguments);
-    command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
-    command.env("OMPI_MCA_rmaps_base_oversubscribe", "1").env("RUST_BACKTRACE", "1");
-    // Looking for networks takes half of the time of a start.
-    command.env("OMPI_MCA_pml", "ob1");
+    command.args(arguments).env("RUST_BACKTRACE", "1");
+    on_one_machine(&mut command);
     if ranks > 2 {
         command.env("OMPI_MCA_mpi_yield_when_idle", "1");
     }
@@ -259,6 +256,13 @@ fn prepare(ranks: usize, arguments: &[&str], directory: &Path) -> (Command, [Pat
     let streams = ["stdout", "stderr"].map(|name| directory.join(name));
     command.stdout(File::create(&streams[0]).unwrap()).stderr(File::create(&streams[1]).unwrap());
     (command, streams)
+}
+
+/// What Open MPI has to know on a machine with few cores, where the tests may be root.
+pub fn on_one_machine(command: &mut Command) {
+    command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+    // Looking for networks takes half of the time of a start.
+    command.env("OMPI_MCA_rmaps_base_oversubscribe", "1").env("OMPI_MCA_pml", "ob1");
 }
 
 /// The end of a command, which is killed and a failure of the test if it does not come in time.
