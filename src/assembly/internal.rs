@@ -6,7 +6,7 @@ use super::{committed, displacements, integrated};
 use crate::decomposition::Subdomain;
 use crate::element::{Nodal, Point, by_kind};
 use crate::material::{History, Material};
-use crate::tensor::{Voigt, apply, contract, von_mises};
+use crate::tensor::von_mises;
 
 /// What one pass over the elements finds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -192,14 +192,12 @@ fn elastic_squares_of<const N: usize, const P: usize, const M: usize>(
     material: &Material,
     vectors: [&[f64]; M],
 ) -> [f64; M] {
-    let tangent = material.elastic_tangent();
     let mut squares = [0.0; M];
     for (nodes, points) in integrated(points, &subdomain.elements, &subdomain.points) {
         for (square, v) in squares.iter_mut().zip(vectors) {
             let v = displacements(v, nodes);
             for point in &points {
-                let strain: Voigt = point.strain(&v);
-                *square += point.weight * contract(&apply(&tangent, &strain), &strain);
+                *square += point.weight * material.elastic_square(&point.strain(&v));
             }
         }
     }

@@ -16,6 +16,14 @@ impl Material {
         c
     }
 
+    /// strain : C : strain (energy per volume).
+    #[inline]
+    pub fn elastic_square(&self, strain: &Voigt) -> f64 {
+        let [xx, yy, zz, xy, yz, zx] = strain.map(|e| e * e);
+        let (volume, mu) = (trace(strain), self.shear_modulus());
+        self.lambda() * volume * volume + mu * (2.0 * (xx + yy + zz) + (xy + yz + zx))
+    }
+
     /// stress : C^-1 : stress (energy per volume).
     pub fn complementary_square(&self, stress: &Voigt) -> f64 {
         let (shear, mean) = (stress_norm(&deviator(stress)), trace(stress) / 3.0);
@@ -37,11 +45,12 @@ mod tests {
     }
 
     #[test]
-    fn the_complementary_square_is_that_of_the_strain_that_the_stress_takes() {
+    fn the_squares_of_a_strain_and_of_its_stress_are_their_double_contraction() {
         let strain = [1e-3, -2e-3, 0.5e-3, 0.7e-3, -1.1e-3, 0.3e-3];
         let stress = apply(&STEEL.elastic_tangent(), &strain);
         let expected = contract(&stress, &strain);
         assert!((STEEL.complementary_square(&stress) - expected).abs() < 1e-14 * expected);
+        assert!((STEEL.elastic_square(&strain) - expected).abs() < 1e-14 * expected);
     }
 
     #[test]

@@ -272,7 +272,7 @@ pub fn solve(
             attempts.push(step);
             continue;
         };
-        let criterion = problem.relative_change(&u, &damped.u, &damped.state.terms);
+        let criterion = timer.time("residuals", || problem.relative_change(&u, &damped.u, &damped.state.terms));
         u = damped.u;
         state = damped.state;
         secant = secant::next(secant, damped.length);
