@@ -290,8 +290,8 @@ pub fn solve_from(
         Progress::Solution(at, solution) => {
             let contact = contact_states(problem, &discrete.pairs, solution);
             let (piece, rows) = &mut *reached.borrow_mut();
-            fields::record(piece, at.time(), problem, solution, &discrete.pairs, &contact);
-            rows.push(step_row(scene, discrete, problem, at, solution, &contact));
+            let von_mises = fields::record(piece, at.time(), problem, solution, &discrete.pairs, &contact);
+            rows.push(step_row(scene, discrete, problem, at, solution, &contact, von_mises));
             closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
         }
     };

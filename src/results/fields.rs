@@ -55,7 +55,8 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
     piece
 }
 
-/// Adds the solution at a time to the mesh. `contact` holds the pairs whose slave is here.
+/// Adds the solution at a time to the mesh; returns the largest von Mises stress in this rank's elements. `contact` holds
+/// the pairs whose slave is here.
 pub fn record(
     piece: &mut Piece,
     time: f64,
@@ -63,7 +64,7 @@ pub fn record(
     solution: &Solution,
     pairs: &[ContactPair],
     contact: &[ContactState],
-) {
+) -> f64 {
     let u = &solution.u;
     let (mut displacement, mut pressure, mut gap, mut status) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (subdomain, u) in problem.subdomains.iter().zip(u) {
@@ -73,7 +74,8 @@ pub fn record(
         gap.extend(slaves.gap);
         status.extend(slaves.status);
     }
-    let (stress, plastic) = element_states(problem, u).unzip();
+    let (stress, plastic): (Vec<f64>, _) = element_states(problem, u).unzip();
+    let largest = stress.iter().fold(0.0, |a: f64, &b| if b.is_nan() || b > a { b } else { a });
     let point_data = vec![
         Field::vector("displacement", &displacement),
         Field::scalar("contact_pressure", pressure),
@@ -90,11 +92,7 @@ pub fn record(
         Field::scalar("error_estimate", estimate),
     ];
     piece.record(time, point_data, cell_data);
-}
-
-/// Largest von Mises stress in this rank's elements.
-pub fn largest_von_mises(problem: &TornProblem, u: &Torn) -> f64 {
-    element_states(problem, u).fold(0.0_f64, |a, (b, _)| if b.is_nan() || b > a { b } else { a })
+    largest
 }
 
 /// Von Mises stress and equivalent plastic strain of all elements, one increment from what is committed.

@@ -8,7 +8,7 @@ use crate::contact::ContactPair;
 use crate::newton::equilibrium::Unheld;
 use crate::newton::loading::{At, Followed};
 use crate::newton::{self, Solution, StepRecord, TornProblem};
-use crate::results::fields::{self, ContactState};
+use crate::results::fields::ContactState;
 use crate::results::summary::{self, Counters, NewtonRow, Residuals, State, StepRow, Summary};
 use crate::scene::{self, Scene};
 
@@ -50,7 +50,7 @@ pub(super) fn unheld(scene: &Scene, unheld: &Unheld) -> String {
     }
 }
 
-/// An increment in numbers.
+/// An increment in numbers; `von_mises` is the largest stress on this rank.
 pub(super) fn step_row(
     scene: &Scene,
     discrete: &Discrete,
@@ -58,6 +58,7 @@ pub(super) fn step_row(
     at: At,
     solution: &Solution,
     contact: &[ContactState],
+    von_mises: f64,
 ) -> StepRow {
     StepRow {
         step: at.stage as u64 + 1,
@@ -66,7 +67,7 @@ pub(super) fn step_row(
         time: at.time(),
         halvings: at.halvings as u64,
         converged: solution.outcome == newton::Outcome::Converged,
-        state: state(discrete, problem, solution, contact),
+        state: state(discrete, problem, solution, contact, von_mises),
     }
 }
 
@@ -174,7 +175,13 @@ pub(super) fn summarise(
 }
 
 /// What a solution is like. Collective.
-fn state(discrete: &Discrete, problem: &TornProblem, solution: &Solution, contact: &[ContactState]) -> State {
+fn state(
+    discrete: &Discrete,
+    problem: &TornProblem,
+    solution: &Solution,
+    contact: &[ContactState],
+    von_mises: f64,
+) -> State {
     let reactions = problem.reactions(&solution.u, &solution.lambda, discrete.supports.len());
     let contact_forces = contact_forces(problem, discrete, contact);
     let names = discrete.supports.iter().map(|s| s.name.clone());
@@ -191,7 +198,7 @@ fn state(discrete: &Discrete, problem: &TornProblem, solution: &Solution, contac
         internal_energy: Some(solution.internal_energy),
         energy: Some(solution.energy),
         max_displacement: Some(maximum(newton::residuals::largest_displacement(&solution.u))),
-        max_von_mises: Some(maximum(fields::largest_von_mises(problem, &solution.u))),
+        max_von_mises: Some(maximum(von_mises)),
         residuals: Residuals {
             equilibrium: Some(solution.residuals.equilibrium),
             gluing: Some(solution.residuals.gluing),
