@@ -6,6 +6,7 @@ mod contacts;
 mod discrete;
 mod held;
 mod meshes;
+mod places;
 mod report;
 mod sizes;
 mod state;

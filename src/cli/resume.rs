@@ -1,6 +1,7 @@
 //! `fetiplast resume`: goes on where a checkpoint stands.
 //!
-//! The scene is read again, from where it was, and has to be the same: a checkpoint knows what was solved, not what for.
+//! The scene is read again, from where it was, and has to be the same: a checkpoint knows what was solved, not what for. Only
+//! its bodies may be cut otherwise.
 
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,10 @@ pub struct Resume {
     /// The checkpoint, OUT/SCENE.checkpoint.h5. If it is damaged the one before is taken.
     #[arg(value_name = "FILE")]
     file: PathBuf,
+    /// Cut bodies otherwise from here on, for example decomposition.subdomains=96; may be repeated. Other keys of the scene
+    /// stay.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
     /// Where results go, if not beside the checkpoint.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -37,7 +42,7 @@ pub struct Resume {
 }
 
 /// What a checkpoint is written by; others are not understood.
-const FORMAT: &str = "fetiplast checkpoint 2";
+const FORMAT: &str = "fetiplast checkpoint 3";
 
 /// What a checkpoint says of its run.
 pub(super) fn labels(plan: &Plan, scene: &str) -> [(&'static str, String); 4] {
@@ -52,7 +57,7 @@ pub(super) fn labels(plan: &Plan, scene: &str) -> [(&'static str, String); 4] {
 /// If the scene has changed, the checkpoint is of no use, or files cannot be read or written.
 pub fn resume(arguments: Resume, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
     let timer = Timer::start();
-    let Resume { file, out, summary, conduct } = arguments;
+    let Resume { file, sets, out, summary, conduct } = arguments;
     let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
     let (path, checkpoint) = open(comm, &file, &mut monitor)?;
     let unreadable = |reason: String| Failure::Input(format!("cannot go on from {}: {reason}", path.display()));
@@ -68,9 +73,14 @@ pub fn resume(arguments: Resume, comm: &dyn Comm, signals: Signals) -> Result<i3
     }
     let mut plan: Plan = serde_json::from_str(&text("run/plan")?)
         .map_err(|error| unreadable(format!("its plan is not understood: {error}")))?;
+    scene::recut(&mut plan.source.sets, sets).map_err(|error| Failure::Scene(error.to_string()))?;
     let found = find(&plan.source, comm)?;
     let scene = found.at_level(plan.source.level, &plan.source.sets)?;
-    let changes = scene::changes(&text("run/scene")?, &scene.to_toml());
+    let mut changes = scene::changes(&text("run/scene")?, &scene.to_toml());
+    if changes.extract_if(.., |change| change.starts_with("decomposition")).count() > 0 {
+        // It was told in boxes that are no more.
+        plan.yielding = None;
+    }
     if !changes.is_empty() {
         return Err(Failure::Scene(format!(
             "the scene has changed since the checkpoint was written: {}; undo that, or solve it from the beginning",
@@ -109,7 +119,7 @@ fn open<'a>(comm: &'a dyn Comm, file: &Path, monitor: &mut Monitor) -> Result<(P
 /// Why a checkpoint is of no use for the scene.
 pub(super) fn unfit(unfit: Unfit) -> Failure {
     match unfit {
-        Unfit::Mesh | Unfit::Subdomains => Failure::Scene(unfit.to_string()),
+        Unfit::Mesh => Failure::Scene(unfit.to_string()),
         Unfit::Unreadable(reason) => Failure::Input(format!("the checkpoint cannot be read: {reason}")),
     }
 }

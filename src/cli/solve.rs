@@ -56,6 +56,10 @@ pub struct Solve {
 /// Tolerance of coarser levels: well below what halving the cells changes.
 const ENOUGH_TO_START: f64 = 5e-2;
 
+/// What to tell of a run that goes on on other subdomains.
+const RECUT: &str = "subdomains are others than when the checkpoint was written: the result is the same to the tolerances of \
+                     the scene, not bit by bit";
+
 /// When coarser levels are solved first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Cascade {
@@ -167,6 +171,8 @@ pub(super) fn carry_out(
                 }
                 run.level(&mut plan, &scene, coarser.take(), checkpoint.take(), &mut monitor).map(Some)
             }
+            // Bodies that are cut otherwise from here on may be too coarse for that here.
+            Err(error) if checkpoint.is_some() => return Err(error),
             Err(_) => Ok(None),
         };
         plan.levels.remove(0);
@@ -261,7 +267,11 @@ impl Run<'_> {
         if let Some(file) = checkpoint {
             let standing = timer.time("checkpoints", || unpack(comm, &discrete, &file));
             let standing = standing.and_then(|standing| file.close().map(|()| standing).map_err(Unfit::from));
-            begin = Begin::At(Box::new(standing.map_err(unfit)?));
+            let (standing, is_recut) = standing.map_err(unfit)?;
+            if is_recut {
+                monitor.event(&Event::Warning(RECUT.into()));
+            }
+            begin = Begin::At(Box::new(standing));
         } else if let Some(initial) = &scene.initial {
             let earlier = timer.time("initial state", || study::earlier(comm, scene, &discrete, initial));
             begin = Begin::After(earlier.map_err(StudyError::from)?);

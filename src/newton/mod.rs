@@ -137,6 +137,9 @@ pub struct Standing {
     pub u: Torn,
     /// Multipliers of this rank's rows.
     pub lambda: Vec<f64>,
+    /// Where multipliers and factors are lost, for they were of other subdomains: the rows that hold, from which and from the
+    /// displacement multipliers follow.
+    pub held: Option<Vec<bool>>,
     /// How exactly the next quadratic program is solved.
     pub forcing: Forcing,
     /// What is kept from step to step.
@@ -209,7 +212,7 @@ pub fn solve(
         Begin::Near(start) => (u, held) = (start.u, Some(start.held)),
         Begin::At(at) => {
             (u, lambda, forcing, steps) = (at.u, at.lambda, at.forcing, at.steps);
-            stood = Some(at.solver);
+            (stood, held) = (Some(at.solver), at.held);
         }
     }
     let mut state = problem.evaluate(&u);
@@ -218,9 +221,9 @@ pub fn solve(
         refused = solver.resume(problem, stood, &lambda, timer).err();
     } else {
         solver.begin();
-        if let Some(held) = held {
-            lambda = solver.expect(problem, &state, held);
-        }
+    }
+    if let Some(held) = held {
+        lambda = solver.expect(problem, &state, held);
     }
     let mut secant = steps.last().map_or(0.0, |step: &StepRecord| secant::next(solver.secant(), step.damping));
     let mut residuals = problem.residuals(&u, &state, &lambda);
@@ -233,7 +236,7 @@ pub fn solve(
         }
         let standing = || {
             let (u, lambda, steps) = (u.clone(), lambda.clone(), steps.clone());
-            Standing { u, lambda, forcing, solver: solver.state(), steps }
+            Standing { u, lambda, held: None, forcing, solver: solver.state(), steps }
         };
         if attempts.is_empty() && pause(&standing) {
             break Outcome::Stopped;

@@ -97,12 +97,9 @@ impl<'a> Checkpoint<'a> {
         self.file.read(name, 0, rows)
     }
 
-    /// Some rows of an array, other ones on each rank.
-    ///
-    /// # Errors
-    /// If there is none of that name and kind, or it is shorter.
-    pub fn rows<T: Number>(&self, name: &str, begin: u64, count: u64) -> Result<Vec<T>, String> {
-        self.file.read(name, begin, count)
+    /// The file, for parts of its arrays.
+    pub fn arrays(&self) -> &SharedFile<'a> {
+        &self.file
     }
 
     /// Closes the file.

@@ -40,6 +40,7 @@ pub use initial::Initial;
 pub use load::Load;
 pub use mapped::{Cylinder, Grid, Sphere};
 pub use material::Material;
+pub use overrides::recut;
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
 pub use step::Step;
 pub use surface::{Face, Support, SurfaceError, SurfaceName};

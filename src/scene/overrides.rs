@@ -50,6 +50,30 @@ pub(super) fn concerns(set: &str, key: &str) -> bool {
     })
 }
 
+/// Adds overrides that cut bodies otherwise to those of a run that goes on; earlier ones that they make meaningless are dropped.
+///
+/// # Errors
+/// If one is malformed, or of another section.
+pub fn recut(sets: &mut Vec<String>, more: Vec<String>) -> Result<(), SceneError> {
+    let keys = |set: &str| parse(set).map(|Override { path, .. }| path);
+    for set in &more {
+        let path = keys(set)?;
+        if path[0] != "decomposition" {
+            let problem =
+                "a run that goes on solves the problem that it began with: only keys of decomposition can be set";
+            return Err(refused(set, problem.into()));
+        }
+        let stale = match path.get(1).map(String::as_str) {
+            Some("subdomains") => "method",
+            Some("method" | "cells") => "subdomains",
+            _ => continue,
+        };
+        sets.retain(|before| keys(before).is_ok_and(|path| path != ["decomposition", stale]));
+    }
+    sets.extend(more);
+    Ok(())
+}
+
 fn refused(set: &str, problem: String) -> SceneError {
     SceneError::Override { set: set.to_owned(), problem }
 }
@@ -137,4 +161,41 @@ fn new_entry(tree: &Table, set: &str, problem: &str) -> Option<String> {
         None => "is empty".to_owned(),
     };
     Some(format!("unknown key `{section}.{name}`: [{section}] {known}; a new entry needs all its keys ({problem})"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cut(before: &[&str], more: &[&str]) -> Result<Vec<String>, String> {
+        let own = |sets: &[&str]| sets.iter().map(|set| set.to_string()).collect::<Vec<_>>();
+        let mut sets = own(before);
+        recut(&mut sets, own(more)).map(|()| sets).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_later_cut_takes_the_place_of_the_one_before() {
+        let kept = ["load.top.traction.2=-75", "decomposition.cluster=2"];
+        for (before, more) in [
+            ("decomposition.subdomains=4", "decomposition.cells=[5, 5, 5]"),
+            ("decomposition.subdomains=4", "decomposition.method=auto"),
+            ("decomposition.method=bricks", "decomposition.subdomains=4"),
+        ] {
+            let found = cut(&[kept[0], before, kept[1]], &[more]).unwrap();
+            assert_eq!(found, [kept[0], kept[1], more]);
+        }
+        let before = ["decomposition.method=bricks", "decomposition.cells=[5, 5, 5]"];
+        assert_eq!(cut(&before, &["decomposition.cells.0=3"]).unwrap().len(), 3);
+        assert_eq!(cut(&before, &[]).unwrap(), before);
+    }
+
+    #[test]
+    fn nothing_but_the_cut_may_change() {
+        let told = cut(&[], &["decomposition.subdomains=4", "material.steel.young=1"]).unwrap_err();
+        assert!(
+            told.starts_with("--set material.steel.young=1: ") && told.contains("only keys of decomposition"),
+            "{told}"
+        );
+        assert!(cut(&[], &["decomposition.subdomains"]).is_err());
+    }
 }

@@ -1,18 +1,26 @@
 //! Where a solution stands as arrays of a checkpoint, and back.
 //!
 //! Arrays go by mesh numbering: displacements by node, with a row for each subdomain's copy, multipliers by row of B,
-//! history by integration point of the elements, subdomain after subdomain in their order. So the ranks do not matter. Copies
-//! of a node agree to round-off only and are kept apart, that the solution goes on to the same bits.
+//! history by integration point of the elements, subdomain after subdomain in their order. So the ranks do not matter.
+//! Copies of a node agree to round-off only and are kept apart, that the solution goes on to the same bits (`same`). Rows
+//! say which node, element or contact they are of: on other subdomains of the same meshes the solution goes on from there,
+//! too (`recut`).
 
-use std::collections::HashMap;
+mod recut;
+mod same;
+#[cfg(test)]
+mod tests;
+
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use self::same::Miss;
 use super::meshes::fingerprints;
+use super::places::key;
 use super::{Discrete, Standing};
-use crate::comm::{Comm, Shares};
-use crate::constraint::Row;
+use crate::comm::Comm;
+use crate::constraint::{Kind, Row};
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::space::RowSpace;
@@ -23,7 +31,6 @@ use crate::newton::forcing::Forcing;
 use crate::newton::loading::{Attempt, Halt};
 use crate::newton::program::ProgramState;
 use crate::newton::{self, Residuals, SolverState, StepRecord};
-use crate::results::agree::agree;
 use crate::results::checkpoint::Checkpoint;
 use crate::results::piece::{Field, Piece, Values};
 use crate::results::summary::StepRow;
@@ -69,13 +76,56 @@ struct Reached {
 /// Name, numbers a row and whether they are real, of the fields of points and of cells.
 type Layout = [Vec<(String, usize, bool)>; 2];
 
+/// Recorded fields, of points or of cells.
+struct Recorded {
+    group: &'static str,
+    layout: Vec<(String, usize, bool)>,
+    /// How many times were recorded.
+    states: u64,
+}
+
+impl Recorded {
+    /// The fields, from arrays of real numbers and of integers that are given by name, numbers a row, and state.
+    fn read(
+        &self,
+        real: impl Fn((&str, usize, u64)) -> Result<Vec<f64>, String>,
+        integer: impl Fn((&str, usize, u64)) -> Result<Vec<i64>, String>,
+    ) -> Result<Vec<Field>, String> {
+        let field = |(name, components, is_real): &(String, usize, bool)| {
+            let path = format!("{}/{name}", self.group);
+            let state = |state| {
+                let at = (&path[..], *components, state);
+                if *is_real { real(at).map(Values::Real) } else { integer(at).map(Values::Integer) }
+            };
+            let states = (0..self.states).map(state).collect::<Result<_, String>>()?;
+            Ok(Field { name: name.clone(), components: *components, states })
+        };
+        self.layout.iter().map(field).collect()
+    }
+}
+
+/// What a checkpoint has in arrays, on own subdomains.
+struct Arrays {
+    u: Torn,
+    /// Of the last solution.
+    last_u: Torn,
+    lambda: Vec<f64>,
+    last_lambda: Vec<f64>,
+    /// The rows that multipliers act on.
+    kept: Vec<bool>,
+    bases: Vec<Bases>,
+    histories: Vec<Vec<History>>,
+    point_data: Vec<Field>,
+    cell_data: Vec<Field>,
+}
+
 /// Texts and arrays of a checkpoint. Collective.
 pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&'static str, String)>, Vec<Field>) {
     let Discrete { decomposition, constraints, .. } = discrete;
     let space = RowSpace::new(comm, &decomposition.shares, constraints);
     let Standing { halt, rows, recorded } = standing;
     let Halt { attempt, committed, last, steps, standing } = halt;
-    let newton::Standing { u, lambda, forcing, solver, steps: own_steps } = standing;
+    let newton::Standing { u, lambda, forcing, solver, steps: own_steps, held: _ } = standing;
     let ProgramState { kept, reference, first, norm } = solver.programs;
     let reached = |solution: &newton::Solution| Reached {
         residuals: solution.residuals,
@@ -122,13 +172,20 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
     let last_lambda = last.map_or_else(|| vec![0.0; lambda.len()], |last| last.lambda);
     let kept = kept.unwrap_or_else(|| vec![false; lambda.len()]);
     let owned: Vec<usize> = space.owned().iter().flatten().map(|&row| row as usize).collect();
+    let contacts: Vec<(usize, [i64; 2])> =
+        owned.iter().filter_map(|&row| Some((row, contact(discrete, row)?))).collect();
+    let force = |row: usize| constraints.rows[row].scale * last_lambda[row];
     let nodes = subdomains.iter().flat_map(|s| &s.nodes).map(|&node| node as i64).collect();
+    let elements = subdomains.iter().flat_map(|s| s.elements.iter().flat_map(|element| key(element, &s.nodes)));
+    let first = decomposition.shares.begin(comm.rank());
+    let clusters = owns.clone().map(|own| decomposition.clusters.of(first + own) as i64);
     let histories: Vec<&History> = owns.clone().flat_map(history).collect();
     let mut arrays = vec![
         Field::integer("subdomains/points", count(&|own| subdomains[own].nodes.len())),
         Field::integer("subdomains/cells", count(&|own| subdomains[own].elements.len())),
         Field::integer("subdomains/rows", count(&|own| space.owned()[own].len())),
         Field::integer("subdomains/histories", count(&|own| history(own).len())),
+        Field::integer("subdomains/cluster", clusters.collect()),
         Field::integer("subdomains/factor", factor.iter().map(code).collect()),
         Field::integer("subdomains/interior", interior.iter().map(code).collect()),
         Field::scalar("subdomains/drift", drift),
@@ -137,15 +194,19 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         vector("points/last", last_u.concat()),
         vector("points/factor", displacements(&factor, zero())),
         vector("points/interior", displacements(&interior, zero())),
+        Field::of("cells/nodes", 4, Values::Integer(elements.collect())),
+        Field::of("contacts/key", 2, Values::Integer(contacts.iter().flat_map(|(_, key)| *key).collect())),
+        Field::integer("contacts/kept", contacts.iter().map(|(row, _)| i64::from(kept[*row])).collect()),
+        Field::scalar("contacts/last_force", contacts.iter().map(|(row, _)| force(*row)).collect()),
         Field::integer("rows/node", owned.iter().map(|&row| lowest_node(&constraints.rows[row]) as i64).collect()),
         Field::integer("rows/kept", owned.iter().map(|&row| i64::from(kept[row])).collect()),
         Field::scalar("rows/multiplier", owned.iter().map(|&row| lambda[row]).collect()),
         Field::scalar("rows/last", owned.iter().map(|&row| last_lambda[row]).collect()),
-        Field {
-            name: "histories/plastic_strain".into(),
-            components: 6,
-            states: vec![Values::Real(histories.iter().flat_map(|history| history.plastic_strain).collect())],
-        },
+        Field::of(
+            "histories/plastic_strain",
+            6,
+            Values::Real(histories.iter().flat_map(|history| history.plastic_strain).collect()),
+        ),
         Field::scalar("histories/kappa", histories.iter().map(|history| history.kappa).collect()),
     ];
     for (group, fields) in [("point_fields", recorded.point_data), ("cell_fields", recorded.cell_data)] {
@@ -155,7 +216,13 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
 }
 
 fn vector(name: &str, values: Vec<f64>) -> Field {
-    Field { name: name.into(), components: 3, states: vec![Values::Real(values)] }
+    Field::of(name, 3, Values::Real(values))
+}
+
+/// What tells a row of a contact from others, however bodies are cut: the number of the contact, and the slave node.
+fn contact(Discrete { constraints, pairs, .. }: &Discrete, row: usize) -> Option<[i64; 2]> {
+    let Kind::Contact { pair } = constraints.rows[row].kind else { return None };
+    Some([pairs[pair].contact as i64, pairs[pair].slave as i64])
 }
 
 fn code(basis: &Option<Basis>) -> i64 {
@@ -195,9 +262,6 @@ pub enum Unfit {
     /// Its meshes are others.
     #[error("the meshes have changed since the checkpoint was written: elements or coordinates of nodes differ")]
     Mesh,
-    /// Its subdomains are others.
-    #[error("the subdomains are others than when the checkpoint was written, though scene and meshes are the same")]
-    Subdomains,
     /// It cannot be read.
     #[error("{0}")]
     Unreadable(String),
@@ -209,164 +273,58 @@ impl From<String> for Unfit {
     }
 }
 
-/// What [`pack`] made of a standing of the same discrete problem, on any number of ranks. Collective.
+/// What [`pack`] made of a standing of the same discrete problem, on any number of ranks, and whether that was cut into
+/// other subdomains. Collective.
 ///
 /// # Errors
 /// If it is of another problem, or cannot be read.
-pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result<Standing, Unfit> {
-    let Discrete { decomposition, constraints, .. } = discrete;
-    let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains);
+pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result<(Standing, bool), Unfit> {
     let json = |error: serde_json::Error| Unfit::Unreadable(format!("its numbers are not understood: {error}"));
     let numbers: Numbers = serde_json::from_str(&file.text(NUMBERS)?).map_err(json)?;
-    let layout: Layout = serde_json::from_str(&file.text(RECORDED)?).map_err(json)?;
+    let [of_points, of_cells]: Layout = serde_json::from_str(&file.text(RECORDED)?).map_err(json)?;
     if numbers.meshes != fingerprints(comm, discrete) {
         return Err(Unfit::Mesh);
     }
-    let space = RowSpace::new(comm, shares, constraints);
-    let first = shares.begin(comm.rank());
-    let part = |name: &str, own: &dyn Fn(usize) -> Option<usize>| -> Result<Part, Unfit> {
-        let counts = file.whole::<i64>(&format!("subdomains/{name}"))?;
-        let fits = counts.len() == shares.total()
-            && (0..subdomains.len()).all(|k| own(k).is_none_or(|n| counts[first + k] == n as i64));
-        agree(comm, "subdomains", if fits { Ok(()) } else { Err("others") }).map_err(|_| Unfit::Subdomains)?;
-        let counts: Vec<usize> = counts.iter().map(|&count| count as usize).collect();
-        let begin = counts[..first].iter().sum();
-        Ok(Part { begin, counts: counts[first..][..subdomains.len()].to_vec(), total: counts.iter().sum() })
+    let states = numbers.times.len() as u64;
+    let recorded = [("point_fields", of_points), ("cell_fields", of_cells)];
+    let recorded = recorded.map(|(group, layout)| Recorded { group, layout, states });
+    let (arrays, is_recut) = match same::read(comm, discrete, file, &recorded) {
+        Ok(arrays) => (arrays, false),
+        Err(Miss::Others) => (recut::read(comm, discrete, file, &recorded)?, true),
+        Err(Miss::Unreadable(reason)) => return Err(reason.into()),
     };
-    let points = part("points", &|own| Some(subdomains[own].nodes.len()))?;
-    let cells = part("cells", &|own| Some(subdomains[own].elements.len()))?;
-    let rows = part("rows", &|own| Some(space.owned()[own].len()))?;
-    let histories = part("histories", &|_| None)?;
-    let alone = Part { begin: first, counts: vec![1; subdomains.len()], total: shares.total() };
 
-    let nodes = subdomains.iter().flat_map(|s| &s.nodes).map(|&node| node as i64);
-    let owned = space.owned().iter().flatten();
-    let of_rows = owned.map(|&row| lowest_node(&constraints.rows[row as usize]) as i64);
-    let same = points.read::<i64>(file, "points/node", 0)?.into_iter().eq(nodes)
-        & rows.read::<i64>(file, "rows/node", 0)?.into_iter().eq(of_rows);
-    agree(comm, "subdomains", if same { Ok(()) } else { Err("others") }).map_err(|_| Unfit::Subdomains)?;
-    let torn = |name: &str| -> Result<Torn, Unfit> { Ok(points.split(points.read(file, name, 0)?, 3)) };
-    let bases = |name: &str| -> Result<Vec<Option<Basis>>, Unfit> {
-        let codes = alone.read::<i64>(file, &format!("subdomains/{name}"), 0)?;
-        Ok(codes.into_iter().zip(torn(&format!("points/{name}"))?).map(|(code, u)| basis(code, u)).collect())
-    };
-    let drift = alone.read::<f64>(file, "subdomains/drift", 0)?;
-    let (factor, interior) = (bases("factor")?, bases("interior")?);
-    let bases = factor.into_iter().zip(interior).zip(drift);
-    let bases = bases.map(|((factor, interior), drift)| Bases { factor, interior, drift }).collect();
-
-    let multiplier = rows.read::<f64>(file, "rows/multiplier", 0)?;
-    let last = rows.read::<f64>(file, "rows/last", 0)?;
-    let kept = rows.read::<i64>(file, "rows/kept", 0)?;
-    let mut of_rows = vec![[0; 3]; constraints.rows.len()];
-    let owned = space.owned().iter().flatten();
-    for (row, ((multiplier, last), kept)) in owned.zip(multiplier.into_iter().zip(last).zip(kept)) {
-        of_rows[*row as usize] = [multiplier.to_bits(), last.to_bits(), kept as u64];
-    }
-    complete(comm, shares, discrete, &mut of_rows);
-    let column = |k: usize| of_rows.iter().map(move |row| f64::from_bits(row[k])).collect::<Vec<f64>>();
-    let kept = numbers.has_kept.then(|| of_rows.iter().map(|row| row[2] == 1).collect());
-
-    let strains = histories.read::<f64>(file, "histories/plastic_strain", 0)?;
-    let kappas = histories.read::<f64>(file, "histories/kappa", 0)?;
-    let strains = strains.as_chunks::<6>().0.iter();
-    let all = strains.zip(kappas).map(|(&plastic_strain, kappa)| History { plastic_strain, kappa }).collect();
-    let committed = Committed { histories: histories.split(all, 1), sizes: numbers.sizes };
-
-    let fields = |group: &str, layout: &[(String, usize, bool)], part: &Part| {
-        let field = |(name, components, is_real): &(String, usize, bool)| {
-            let path = format!("{group}/{name}");
-            let state = |state| -> Result<Values, Unfit> {
-                Ok(if *is_real {
-                    Values::Real(part.read(file, &path, state)?)
-                } else {
-                    Values::Integer(part.read(file, &path, state)?)
-                })
-            };
-            let states = (0..numbers.times.len()).map(state).collect::<Result<_, _>>()?;
-            Ok(Field { name: name.clone(), components: *components, states })
-        };
-        layout.iter().map(field).collect::<Result<Vec<Field>, Unfit>>()
-    };
-    let point_data = fields("point_fields", &layout[0], &points)?;
-    let cell_data = fields("cell_fields", &layout[1], &cells)?;
-    let last = match numbers.last {
-        None => None,
-        Some(reached) => Some(newton::Solution {
-            u: torn("points/last")?,
-            lambda: column(1),
-            outcome: newton::Outcome::Converged,
-            steps: Vec::new(),
-            residuals: reached.residuals,
-            // Told in the rows.
-            errors: None,
-            ended_by_accuracy: false,
-            energy: reached.energy,
-            internal_energy: reached.internal_energy,
-            external_work: reached.external_work,
-            plastic_elements: reached.plastic_elements,
-        }),
-    };
-    let programs = ProgramState { kept, reference: numbers.reference, first: numbers.first, norm: numbers.norm };
+    let last = numbers.last.map(|reached| newton::Solution {
+        u: arrays.last_u,
+        lambda: arrays.last_lambda,
+        outcome: newton::Outcome::Converged,
+        steps: Vec::new(),
+        residuals: reached.residuals,
+        // Told in the rows.
+        errors: None,
+        ended_by_accuracy: false,
+        energy: reached.energy,
+        internal_energy: reached.internal_energy,
+        external_work: reached.external_work,
+        plastic_elements: reached.plastic_elements,
+    });
+    let kept = numbers.has_kept.then_some(arrays.kept);
+    let (kept, held) = if is_recut { (None, kept) } else { (kept, None) };
+    // The operator of other subdomains has another norm.
+    let norm = numbers.norm.filter(|_| !is_recut);
+    let programs = ProgramState { kept, reference: numbers.reference, first: numbers.first, norm };
     let precision = if numbers.is_double { Precision::Double } else { Precision::Single };
     let standing = newton::Standing {
-        u: torn("points/displacement")?,
-        lambda: column(0),
+        u: arrays.u,
+        lambda: arrays.lambda,
+        held,
         forcing: numbers.forcing,
-        solver: SolverState { programs, secant: numbers.secant, precision, bases },
+        solver: SolverState { programs, secant: numbers.secant, precision, bases: arrays.bases },
         steps: numbers.own_steps,
     };
+    let committed = Committed { histories: arrays.histories, sizes: numbers.sizes };
     let halt = Halt { attempt: numbers.attempt, committed, last, steps: numbers.steps, standing };
+    let Arrays { point_data, cell_data, .. } = arrays;
     let recorded = Piece { times: numbers.times, point_data, cell_data, ..Piece::default() };
-    Ok(Standing { halt, rows: numbers.rows, recorded })
-}
-
-/// The rows of an array that belong to own subdomains.
-struct Part {
-    begin: usize,
-    counts: Vec<usize>,
-    /// Of all subdomains.
-    total: usize,
-}
-
-impl Part {
-    /// Of one of several states.
-    fn read<T: crate::results::hdf5::Number>(
-        &self,
-        file: &Checkpoint,
-        name: &str,
-        state: usize,
-    ) -> Result<Vec<T>, String> {
-        let begin = (state * self.total + self.begin) as u64;
-        file.rows(name, begin, self.counts.iter().sum::<usize>() as u64)
-    }
-
-    /// Numbers of each own subdomain, `width` a row.
-    fn split<T>(&self, all: Vec<T>, width: usize) -> Vec<Vec<T>> {
-        let mut all = all.into_iter();
-        self.counts.iter().map(|count| all.by_ref().take(count * width).collect()).collect()
-    }
-}
-
-/// Fills in what ranks know of rows that they hold but do not own, from those that do. Collective.
-fn complete(comm: &dyn Comm, shares: &Shares, discrete: &Discrete, rows: &mut [[u64; 3]]) {
-    let constraints = &discrete.constraints;
-    let blocks = constraints.blocks.iter().zip(&constraints.block_subdomains);
-    let (mut own, mut foreign) = (HashMap::new(), vec![Vec::new(); comm.size()]);
-    for (block, subdomains) in blocks {
-        let node = block.clone().map(|row| lowest_node(&constraints.rows[row])).min().unwrap_or_default();
-        match shares.owner(subdomains[0] as usize) {
-            owner if owner == comm.rank() => {
-                own.insert(node, block.clone());
-            }
-            owner => foreign[owner].push((node, block.clone())),
-        }
-    }
-    let wishes = foreign.iter().map(|blocks| blocks.iter().map(|(node, _)| *node).collect()).collect();
-    let answer = |wish: Vec<u64>| wish.iter().flat_map(|node| rows[own[node].clone()].concat()).collect();
-    let answers: Vec<Vec<u64>> = comm.all_to_all(wishes).into_iter().map(answer).collect();
-    for (blocks, answers) in foreign.into_iter().zip(comm.all_to_all(answers)) {
-        let of_blocks = blocks.into_iter().flat_map(|(_, block)| block);
-        of_blocks.zip(answers.as_chunks::<3>().0).for_each(|(row, answer)| rows[row] = *answer);
-    }
+    Ok((Standing { halt, rows: numbers.rows, recorded }, is_recut))
 }

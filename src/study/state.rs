@@ -5,7 +5,6 @@
 //! subdomains matter, and bodies may be others, if only those that take their state have the same mesh. The displacement
 //! comes with it, from the last fields: equilibrium with that state does not depend on it, but is near.
 
-use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 
@@ -14,6 +13,7 @@ use thiserror::Error;
 
 use super::Discrete;
 use super::meshes::{MeshOf, meshes};
+use super::places::{Places, Wanted, key};
 use crate::comm::Comm;
 use crate::feti::Torn;
 use crate::material::History;
@@ -57,11 +57,6 @@ pub(super) fn pack(problem: &TornProblem, meshes: Vec<MeshOf>) -> State {
     State { description: serde_json::to_string(&description).expect("numbers and names can be written"), arrays }
 }
 
-/// What tells an element from others of its mesh.
-fn key(element: &[u32], nodes: &[u64]) -> [i64; 4] {
-    std::array::from_fn(|k| nodes[element[k] as usize] as i64)
-}
-
 /// Why a result file is no start for a scene; the same on every rank.
 #[derive(Debug, Error)]
 pub enum NoStart {
@@ -103,9 +98,6 @@ pub fn earlier(comm: &dyn Comm, scene: &Scene, discrete: &Discrete, initial: &In
     read(comm, scene, discrete, initial, &path).map_err(|reason| NoStart::Unfit { path: shown(), reason })
 }
 
-/// Rows that are read at once.
-const BLOCK: u64 = 1 << 16;
-
 fn read(
     comm: &dyn Comm,
     scene: &Scene,
@@ -129,57 +121,28 @@ fn read(
     }
 
     let subdomains = &discrete.decomposition.subdomains;
-    let own = |body: usize| taken.ranges.iter().any(|(_, _, of)| *of == body);
-    let mut elements: HashMap<[i64; 4], (usize, usize)> = HashMap::new();
-    let mut copies: HashMap<i64, Vec<(usize, usize)>> = HashMap::new();
-    for (k, subdomain) in subdomains.iter().enumerate().filter(|(_, s)| own(s.body)) {
-        elements.extend(subdomain.elements.iter().enumerate().map(|(e, nodes)| (key(nodes, &subdomain.nodes), (k, e))));
-        subdomain.nodes.iter().enumerate().for_each(|(n, &node)| copies.entry(node as i64).or_default().push((k, n)));
-    }
-
-    let mut histories: Vec<Vec<History>> = vec![Vec::new(); subdomains.len()];
-    let rows = file.count("state/kappa")?;
-    let mut misfits = 0;
-    for block in blocks(0..rows) {
-        let (nodes, points) = (part::<i64>(&file, "state/nodes", &block)?, part::<i64>(&file, "state/point", &block)?);
-        let strains = part::<f64>(&file, "state/plastic_strain", &block)?;
-        let kappas = part::<f64>(&file, "state/kappa", &block)?;
-        let states = strains.as_chunks::<6>().0.iter().zip(kappas);
-        for ((nodes, point), (&plastic_strain, kappa)) in nodes.as_chunks::<4>().0.iter().zip(points).zip(states) {
-            let Some(&(k, element)) = taken.here(nodes).and_then(|nodes| elements.get(&nodes)) else { continue };
-            let of_element = subdomains[k].elements.kind().points();
-            let history = &mut histories[k];
-            history.resize(of_element * subdomains[k].elements.len(), History::default());
-            match history.get_mut(of_element * element..).and_then(|points| points.get_mut(point as usize)) {
-                Some(entry) if (point as usize) < of_element => *entry = History { plastic_strain, kappa },
-                _ => misfits += 1,
-            }
-        }
-    }
-
-    let mut u: Torn = subdomains.iter().map(|s| vec![0.0; s.dofs()]).collect();
-    let points = file.count("VTKHDF/PointData/node")?;
-    let states = file.count("VTKHDF/PointData/displacement")?;
-    let last = states.checked_sub(points).ok_or("it is damaged: it has fewer displacements than points")?;
-    for block in blocks(0..points) {
-        let nodes = part::<i64>(&file, "VTKHDF/PointData/node", &block)?;
-        let block = block.start + last..block.end + last;
-        let displacement = part::<f64>(&file, "VTKHDF/PointData/displacement", &block)?;
-        for (&node, moved) in nodes.iter().zip(displacement.as_chunks::<3>().0) {
-            // One of the copies there counts for all of them here.
-            let here = taken.here(&[node]).and_then(|[node]| copies.remove(&node));
-            for (k, n) in here.into_iter().flatten() {
-                u[k][3 * n..][..3].copy_from_slice(moved);
-            }
-        }
-    }
-    file.close()?;
-    let whole = misfits == 0 && copies.is_empty();
+    let places = Places::new(subdomains, |s| taken.ranges.iter().any(|(_, _, body)| *body == s.body));
+    let nodes =
+        Wanted::find(&file, "VTKHDF/PointData/node", |node| taken.here(node).and_then(|[node]| places.node(node)))?;
+    let elements = Wanted::find(&file, "state/nodes", |key| taken.here(key).and_then(|key| places.element(key)))?;
+    let of_elements = elements.read::<i64>(&file, "state/point", 0)?;
+    let count = |k: usize| subdomains[k].elements.kind().points();
+    let found = || elements.rows().zip(&of_elements);
+    let fit = found().all(|((_, (k, _)), point)| (0..count(k) as i64).contains(point));
+    let whole = fit && places.have_nodes(&nodes);
     agree(
         comm,
         "the state",
         if whole { Ok(()) } else { Err("it is damaged: nodes or integration points are missing") },
     )?;
+    let points = found().map(|((row, (k, e)), &point)| (row, (k, count(k) * e + point as usize)));
+    let histories = places.histories(&file, &Wanted::new(elements.total(), points), "state")?;
+
+    let displacement = "VTKHDF/PointData/displacement";
+    let states = file.count(displacement)?.checked_div(nodes.total()).unwrap_or_default();
+    let last = states.checked_sub(1).ok_or("it is damaged: it has fewer displacements than points")?;
+    let u = places.at_nodes(&file, &nodes, (displacement, 3, last))?;
+    file.close()?;
     Ok(Earlier { committed: Committed { histories, sizes }, u })
 }
 
@@ -191,7 +154,7 @@ struct Taken {
 
 impl Taken {
     /// Nodes of a body by their numbers here; `None` if the body is not taken.
-    fn here<const N: usize>(&self, there: &[i64; N]) -> Option<[i64; N]> {
+    fn here<const N: usize>(&self, there: [i64; N]) -> Option<[i64; N]> {
         let (range, first, _) = self.ranges.iter().find(|(range, ..)| range.contains(&there[0]))?;
         Some(there.map(|node| node - range.start + *first as i64))
     }
@@ -226,13 +189,4 @@ fn same(mesh: &MeshOf, there: &[MeshOf]) -> Result<Range<i64>, String> {
         ));
     }
     Ok(found.first_node as i64..(found.first_node + found.nodes) as i64)
-}
-
-fn blocks(rows: Range<u64>) -> impl Iterator<Item = Range<u64>> {
-    let end = rows.end;
-    rows.step_by(BLOCK as usize).map(move |begin| begin..end.min(begin + BLOCK))
-}
-
-fn part<T: crate::results::hdf5::Number>(file: &SharedFile, name: &str, rows: &Range<u64>) -> Result<Vec<T>, String> {
-    file.read(name, rows.start, rows.end - rows.start)
 }

@@ -1,12 +1,16 @@
 //! A run that is stopped goes on where it stood, on any number of ranks, and arrives at the same bits.
 
+mod recut;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Duration;
 
 use crate::common::fields::Fields;
-use crate::common::{COARSE, End, children, only_result, run_disturbed, send, wait_for};
+use crate::common::msh::{Form, write};
+use crate::common::{COARSE, COARSEST, End, children, only_result, run_disturbed, scene_file, send, wait_for};
+use fetiplast::mesh::Brick;
 use serde_json::{Map, Value};
 
 /// Plastic flow, and contact that opens again.
@@ -20,7 +24,31 @@ fn solve<'a>(out: &'a Path, sets: &[&'a str], more: &[&'a str]) -> Vec<&'a str> 
 }
 
 fn resume(ranks: usize, file: &Path) -> End {
-    run_disturbed(ranks, &["resume", file.to_str().unwrap(), "--progress", "off"], |_| ())
+    resume_with(ranks, file, &[])
+}
+
+fn resume_with(ranks: usize, file: &Path, more: &[&str]) -> End {
+    run_disturbed(ranks, &[&["resume", file.to_str().unwrap(), "--progress", "off"], more].concat(), |_| ())
+}
+
+/// A run stopped after so many Newton steps: no run does less than one. Where its checkpoint is.
+fn stopped_after(steps: usize, out: &Path, sets: &[&str]) -> PathBuf {
+    const AT_ONCE: [&str; 2] = ["--time-limit", "0.000001"];
+    let file = checkpoint(out);
+    for step in 0..steps {
+        let end = match step {
+            0 => run_disturbed(1, &solve(out, sets, &AT_ONCE), |_| ()),
+            _ => resume_with(1, &file, &AT_ONCE),
+        };
+        assert_eq!(end.code, 75, "{}{}", end.stdout, end.stderr);
+    }
+    file
+}
+
+/// The increment of each Newton step of a run that came to its end.
+fn newton(out: &Path) -> Vec<u64> {
+    let (summary, _) = result(out, "two-blocks");
+    summary["newton"].as_array().unwrap().iter().map(|row| row["increment"].as_u64().unwrap()).collect()
 }
 
 fn checkpoint(out: &Path) -> PathBuf {
@@ -216,4 +244,55 @@ fn a_changed_scene_is_refused_and_the_difference_named() {
     assert!(!out.join("blocks.json").exists());
     fs::write(&scene, text).unwrap();
     assert_eq!(resume(2, &file).code, 0);
+}
+
+#[test]
+fn a_changed_mesh_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let mesh = |length: f64| {
+        let bar = Brick { origin: [0.0; 3], size: [length, 1.0, 1.0], cells: [6, 2, 2] };
+        fs::write(directory.path().join("bar.msh"), write(&[("bar", bar)], Form::Binary41)).unwrap();
+    };
+    let text = r#"
+        material.steel = { young = 210.0, poisson = 0.3, yield_stress = 0.45, hardening = 10.0 }
+        body.bar = { material = "steel", element = "tet4", gmsh = { file = "bar.msh" } }
+        support.back = { surface = "bar.xmin", fix = ["x", "y", "z"] }
+        load.pull = { surface = "bar.xmax", traction = [0.5, 0.0, 0.0] }
+        decomposition.subdomains = 3
+    "#;
+    mesh(3.0);
+    let (scene, out) = (scene_file(directory.path(), text), directory.path().join("out"));
+    let mut arguments = solve(&out, &[], &["--time-limit", "0.001"]);
+    arguments[1] = &scene;
+    assert_eq!(run_disturbed(2, &arguments, |_| ()).code, 75);
+    let file = out.join("scene.checkpoint.h5");
+    for more in [&[][..], &["--set", "decomposition.subdomains=2"]] {
+        mesh(3.5);
+        let end = resume_with(2, &file, more);
+        assert_eq!(end.code, 65, "{}", end.stderr);
+        let told = "fetiplast: the meshes have changed since the checkpoint was written: elements or coordinates";
+        assert_eq!(end.stderr.matches(told).count(), 1, "{}", end.stderr);
+        assert!(!out.join("scene.json").exists());
+    }
+    mesh(3.0);
+    assert_eq!(resume(2, &file).code, 0);
+}
+
+#[test]
+fn a_run_from_the_state_of_another_goes_on_to_the_same_bits() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    assert_eq!(run_disturbed(2, &solve(&at("pressed"), &COARSEST, &[]), |_| ()).code, 0);
+    let start = format!("initial.result=\"{}\"", at("pressed").join("two-blocks.vtkhdf").display());
+    let sets = [&COARSEST[..], &[&start, "step=[{amplitude=0.2}, {amplitude=1.1}]"]].concat();
+    assert_eq!(run_disturbed(2, &solve(&at("whole"), &sets, &[]), |_| ()).code, 0);
+    let steps = newton(&at("whole"));
+    assert!(steps.len() > 5);
+    for stop in [1, 2, steps.len() - 2] {
+        let out = at(&stop.to_string());
+        let file = stopped_after(stop, &out, &sets);
+        let end = resume(3, &file);
+        assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+        assert_same_result(&out, &at("whole"), "two-blocks");
+    }
 }

@@ -1,9 +1,8 @@
 //! Runs that start from the result of an earlier one: they go on as one history would.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::common::fields::Fields;
+use crate::common::fields::{Fields, State, difference, state_at};
 use crate::common::{Run, assert_refused, assert_scene_refused, check, solve, solve_tightly};
 use fetiplast::analytic::cycle::Cycle;
 use fetiplast::material::Material;
@@ -23,28 +22,9 @@ fn from(result: &Path) -> String {
     format!("initial.result=\"{}\"", result.display())
 }
 
-/// Displacements by node, stress and plastic strain by the nodes of an element.
-type State = (BTreeMap<i64, [f64; 3]>, BTreeMap<Vec<i64>, [f64; 2]>);
-
-/// The last state of a file, whatever its subdomains.
-fn state(path: &Path) -> State {
-    let last = Fields::times(path).map_or(0, |times| times.len() - 1);
-    let fields = Fields::at(path, last);
-    let nodes = fields.integers_of_points("node");
-    let (stress, kappa) = (fields.of_elements("von_mises"), fields.of_elements("equivalent_plastic_strain"));
-    let states = stress.into_iter().zip(kappa).map(|(stress, kappa)| [stress, kappa]);
-    let elements = fields.elements.iter().map(|element| element.iter().map(|&point| nodes[point]).collect());
-    (nodes.iter().copied().zip(fields.displacement).collect(), elements.zip(states).collect())
-}
-
-/// Largest difference of values with the same key, relative to the largest value, by component.
-fn difference<K: Ord, const N: usize>(a: &BTreeMap<K, [f64; N]>, b: &BTreeMap<K, [f64; N]>) -> f64 {
-    assert!(a.keys().eq(b.keys()) && !a.is_empty());
-    let differences = (0..N).map(|k| {
-        let size = b.values().fold(0.0_f64, |size, value| size.max(value[k].abs()));
-        a.values().zip(b.values()).fold(0.0_f64, |worst, (a, b)| worst.max((a[k] - b[k]).abs())) / size
-    });
-    differences.fold(0.0, f64::max)
+/// The last state of a file.
+fn last(path: &Path) -> State {
+    state_at(path, Fields::times(path).map_or(0, |times| times.len() - 1))
 }
 
 /// Pressed in one run and released in another, cut otherwise: as in one history, for every element.
@@ -59,12 +39,12 @@ fn a_run_goes_on_from_the_result_of_another_as_one_history() {
         let (four, seven) = ("decomposition.subdomains=4", "decomposition.subdomains=7");
         let pressed = solve(2, &[four]);
         let history = solve(1, &[four, "step=[{}, {amplitude=0.2}]"]);
-        let (moved, answers) = state(&history.result());
+        let (moved, answers) = last(&history.result());
         assert!(answers.values().any(|[_, kappa]| *kappa > 1e-4), "nothing flows");
         let start = from(&pressed.result());
         let released = [1, 2, 3].map(|ranks| solve(ranks, &[seven, "step=[{amplitude=0.2}]", &start]));
         for run in &released {
-            let (moved_1, answers_1) = state(&run.result());
+            let (moved_1, answers_1) = last(&run.result());
             let errors = [difference(&moved_1, &moved), difference(&answers_1, &answers)];
             assert!(errors.iter().all(|error| *error < 1e-10), "{element}: {errors:?}");
         }

@@ -1,5 +1,6 @@
 //! The mesh and the fields of a result file.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use hdf5_metno::{Dataset, File, H5Type};
@@ -125,6 +126,29 @@ fn bits(dataset: &Dataset) -> Vec<u64> {
     } else {
         dataset.read_raw::<f64>().unwrap().into_iter().map(f64::to_bits).collect()
     }
+}
+
+/// Displacements by node, stress and plastic strain by the nodes of an element.
+pub type State = (BTreeMap<i64, [f64; 3]>, BTreeMap<Vec<i64>, [f64; 2]>);
+
+/// The state at one of the times of a file, whatever its subdomains.
+pub fn state_at(path: &Path, time: usize) -> State {
+    let fields = Fields::at(path, time);
+    let nodes = fields.integers_of_points("node");
+    let (stress, kappa) = (fields.of_elements("von_mises"), fields.of_elements("equivalent_plastic_strain"));
+    let states = stress.into_iter().zip(kappa).map(|(stress, kappa)| [stress, kappa]);
+    let elements = fields.elements.iter().map(|element| element.iter().map(|&point| nodes[point]).collect());
+    (nodes.iter().copied().zip(fields.displacement).collect(), elements.zip(states).collect())
+}
+
+/// Largest difference of values with the same key, relative to the largest value, by component.
+pub fn difference<K: Ord, const N: usize>(a: &BTreeMap<K, [f64; N]>, b: &BTreeMap<K, [f64; N]>) -> f64 {
+    assert!(a.keys().eq(b.keys()) && !a.is_empty());
+    let differences = (0..N).map(|k| {
+        let size = b.values().fold(0.0_f64, |size, value| size.max(value[k].abs()));
+        a.values().zip(b.values()).fold(0.0_f64, |worst, (a, b)| worst.max((a[k] - b[k]).abs())) / size
+    });
+    differences.fold(0.0, f64::max)
 }
 
 /// Fails unless every value is the expected one, relative to `scale`.
