@@ -3,7 +3,7 @@
 //!
 //! Regions of bodies are cut one by one: a part never spans two bodies or two materials. Elements of a body cost the same,
 //! as they have one kind; between bodies they count as so many linear tetrahedra. Contact surfaces stay on few subdomains
-//! because cutting between two elements at them counts as much as cutting [`AT_CONTACT`] other faces: on the benchmark, cut
+//! because cutting between two elements at them counts as much as cutting `AT_CONTACT` other faces: on the benchmark, cut
 //! into 12 to 288 parts, that leaves 16 to 43 % fewer subdomains in contact for at most 5 % more dual unknowns.
 
 use std::borrow::Cow;
