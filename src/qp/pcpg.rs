@@ -13,7 +13,7 @@ use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics, axpy};
 
 /// Directions kept (two vectors each); beyond that the oldest is replaced.
-const KEPT: usize = 120;
+const KEPT: usize = 240;
 
 /// Drop of the squared norm from which it is measured again.
 const REFRESH: f64 = 1e-4;
