@@ -79,7 +79,7 @@ fn subdomain(cells: usize) {
     let mut values = vec![0.0; pattern.rows.len()];
     let rest = vec![0.0; pattern.dofs()];
     let assembly = best(200, || {
-        stiffness::assemble(&subdomains[0], &materials[0], &[], (&rest, 0.0), pattern, &mut values);
+        stiffness::assemble(&subdomains[0], &materials[0], &[], (&rest, &[]), pattern, &mut values);
     });
     for precision in [Precision::Single, Precision::Double] {
         let mut factors = Factors::new(symbolic.clone(), precision);

@@ -266,7 +266,7 @@ impl<'a> Setup<'a> {
 /// The lower values of a subdomain's elastic stiffness.
 pub fn elastic(subdomain: &Subdomain, material: &Material, pattern: &Pattern) -> Vec<f64> {
     let mut values = vec![0.0; pattern.rows.len()];
-    stiffness::assemble(subdomain, material, &[], (&vec![0.0; subdomain.dofs()], 0.0), pattern, &mut values);
+    stiffness::assemble(subdomain, material, &[], (&vec![0.0; subdomain.dofs()], &[]), pattern, &mut values);
     values
 }
 

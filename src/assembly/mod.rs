@@ -2,6 +2,7 @@
 //!
 //! Every function works on one subdomain; nothing here communicates.
 
+pub mod flow;
 pub mod internal;
 pub mod loads;
 pub mod pattern;

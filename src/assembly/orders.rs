@@ -57,7 +57,7 @@ pub fn displacement(
 ) -> Vec<f64> {
     let pattern = Pattern::new(cube.nodes.len(), &cube.elements, &[]);
     let mut k = vec![0.0; pattern.rows.len()];
-    stiffness::assemble(cube, &MATERIAL, &[], (&vec![0.0; cube.dofs()], 0.0), &pattern, &mut k);
+    stiffness::assemble(cube, &MATERIAL, &[], (&vec![0.0; cube.dofs()], &[]), &pattern, &mut k);
     let mut f = vec![0.0; cube.dofs()];
     for nodes in &cube.elements {
         let places: Vec<[f64; 3]> = nodes.iter().map(|&n| cube.points[n as usize]).collect();

@@ -1,4 +1,4 @@
-//! `K_k`: the consistent tangent of a subdomain; at rest it is the elastic stiffness `K_e`.
+//! `K_k`: the tangent of a subdomain; at rest it is the elastic stiffness `K_e`.
 
 use super::pattern::Pattern;
 use super::{committed, displacements, integrated};
@@ -6,19 +6,19 @@ use crate::decomposition::Subdomain;
 use crate::element::point::block;
 use crate::element::{Nodal, Point, by_kind};
 use crate::material::{History, Material};
+use crate::tensor::Voigt;
 
-/// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed `history`, with a share
-/// of the `secant` stiffness ([`Material::stiffness`]).
-/// Returns the number of elements that yield.
+/// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed `history`, with
+/// the directions of [`super::flow`]; without them it is the consistent one. Returns the number of elements that yield.
 pub fn assemble(
     subdomain: &Subdomain,
     material: &Material,
     history: &[History],
-    (u, secant): (&[f64], f64),
+    (u, flow): (&[f64], &[Voigt]),
     pattern: &Pattern,
     values: &mut [f64],
 ) -> usize {
-    by_kind!(subdomain.elements.kind(), assemble_of(subdomain, material, history, (u, secant), pattern, values))
+    by_kind!(subdomain.elements.kind(), assemble_of(subdomain, material, history, (u, flow), pattern, values))
 }
 
 fn assemble_of<const N: usize, const P: usize>(
@@ -26,7 +26,7 @@ fn assemble_of<const N: usize, const P: usize>(
     subdomain: &Subdomain,
     material: &Material,
     history: &[History],
-    (u, secant): (&[f64], f64),
+    (u, flow): (&[f64], &[Voigt]),
     pattern: &Pattern,
     values: &mut [f64],
 ) -> usize {
@@ -42,7 +42,7 @@ fn assemble_of<const N: usize, const P: usize>(
             let strain = point.strain(&u);
             if material.respond(&strain, committed).plastic {
                 yields = true;
-                point.add_stiffness(&material.stiffness(&strain, committed, secant), &mut k);
+                point.add_stiffness(&material.stiffness(&strain, committed, flow.get(P * index + at)), &mut k);
             } else {
                 point.add_stiffness(&elastic, &mut k);
             }

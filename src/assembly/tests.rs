@@ -124,7 +124,7 @@ fn rigid_motions_meet_no_stiffness_in_any_shape_elastic_or_plastic() {
                 let pattern = pattern_of(subdomain);
                 let mut values = vec![0.0; pattern.rows.len()];
                 let u = linear_field(subdomain, if own % 2 == 0 { 0.0 } else { 0.1 });
-                stiffness::assemble(subdomain, &STEEL, &[], (&u, 0.0), &pattern, &mut values);
+                stiffness::assemble(subdomain, &STEEL, &[], (&u, &[]), &pattern, &mut values);
                 blocks.push(dense(&pattern, &values));
             }
             let k = block_diagonal(&blocks);
@@ -187,7 +187,7 @@ fn assert_derivatives(subdomain: &Subdomain, material: &Material, history: &[His
 
     let pattern = pattern_of(subdomain);
     let mut values = vec![0.0; pattern.rows.len()];
-    let plastic = stiffness::assemble(subdomain, material, history, (u, 0.0), &pattern, &mut values);
+    let plastic = stiffness::assemble(subdomain, material, history, (u, &[]), &pattern, &mut values);
     assert_eq!(plastic, here.0.plastic);
     let change: Vec<f64> = ahead.1.iter().zip(&back.1).map(|(a, b)| (a - b) / (2.0 * h)).collect();
     assert_close(&column(&change), &(dense(&pattern, &values) * column(direction)), 1e-6);

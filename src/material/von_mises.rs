@@ -24,7 +24,7 @@
 //! committed state. No rate dependence, no plane stress.
 
 use super::Material;
-use crate::tensor::{Tangent, Voigt, contract, deviator, trace};
+use crate::tensor::{Tangent, Voigt, contract, deviator, stress_norm, trace};
 
 /// What a material point remembers between load steps; zero is the virgin state. The back stress follows from the
 /// plastic strain.
@@ -74,7 +74,7 @@ struct Trial {
 
 /// Equivalent stress of a deviator.
 fn equivalent(deviator: &Voigt) -> f64 {
-    1.5f64.sqrt() * crate::tensor::stress_norm(deviator)
+    1.5f64.sqrt() * stress_norm(deviator)
 }
 
 impl Trial {
@@ -151,34 +151,62 @@ impl Material {
     /// The consistent tangent d stress / d strain of the same step: symmetric, at most C_e, at least
     /// (H + C) / (3 mu + H + C) C_e. In an elastic step it is [`Material::elastic_tangent`] to the last bit.
     pub fn tangent(&self, strain: &Voigt, committed: &History) -> Tangent {
-        self.stiffness(strain, committed, 0.0)
+        self.stiffness(strain, committed, None)
     }
 
-    /// The tangent with a share, from 0 to 1, of what the secant stiffness has beyond it; at most C_e. The secant stiffness is
-    /// the tangent without N x N: xi is that times the deviator of the elastic strain, but for what is fixed in the step, and
-    /// Psi(a) <= Psi(b) + sigma(b) : (a - b) + 1/2 (a - b) : secant(b) : (a - b).
-    pub fn stiffness(&self, strain: &Voigt, committed: &History, secant: f64) -> Tangent {
+    /// The tangent with the symmetric part of W x N in place of N x N, for a direction of `flow` W in the unit ball of deviators;
+    /// without one it is N. Symmetric, at least (H + C) / (3 mu + H + C) C_e, at most 2 C_e, and C_e where W : N = |W|. See
+    /// [`crate::assembly::flow`].
+    pub fn stiffness(&self, strain: &Voigt, committed: &History, flow: Option<&Voigt>) -> Tangent {
         let trial = Trial::new(self, strain, committed);
         if !trial.plastic() {
             return self.elastic_tangent();
         }
         let (bulk, mu) = (self.bulk_modulus(), self.shear_modulus());
         let shear = mu * trial.shrink;
-        // N x N = 3/2 xi x xi / q^2.
         let q = trial.equivalent;
-        let along = (1.0 - secant) * 9.0 * mu * mu * (trial.step / q - 1.0 / self.plastic_modulus()) / (q * q);
+        let normal = trial.relative.map(|s| 1.5f64.sqrt() * s / q);
+        let flow = flow.unwrap_or(&normal);
+        let along = 3.0 * mu * mu * (trial.step / q - 1.0 / self.plastic_modulus());
         let mut c = [[0.0; 6]; 6];
         for i in 0..3 {
             c[i][..3].fill(bulk - 2.0 / 3.0 * shear);
             c[i][i] += 2.0 * shear;
             c[i + 3][i + 3] = shear;
         }
-        for (row, si) in c.iter_mut().zip(trial.relative) {
-            for (entry, sj) in row.iter_mut().zip(trial.relative) {
-                *entry += along * (si * sj);
+        for i in 0..6 {
+            for j in 0..6 {
+                c[i][j] += along * (flow[i] * normal[j] + normal[i] * flow[j]);
             }
         }
         c
+    }
+
+    /// The direction of flow that the equation `|xi| W = xi`, linear around `strain` and `flow`, gives after a `change` of the
+    /// strain by a step of this `length`, moved into the unit ball. Where `strain` is elastic it is N after the change.
+    pub fn flow(
+        &self,
+        strain: &Voigt,
+        committed: &History,
+        flow: Option<&Voigt>,
+        (change, length): (&Voigt, f64),
+    ) -> Voigt {
+        let trial = Trial::new(self, strain, committed);
+        let (mu, d) = (self.shear_modulus(), deviator(change));
+        let change = [2.0 * mu * d[0], 2.0 * mu * d[1], 2.0 * mu * d[2], mu * d[3], mu * d[4], mu * d[5]];
+        if !trial.plastic() {
+            let moved: Voigt = std::array::from_fn(|i| trial.relative[i] + change[i]);
+            let norm = stress_norm(&moved);
+            return if norm > 0.0 { moved.map(|s| s / norm) } else { moved };
+        }
+        let norm = stress_norm(&trial.relative);
+        let normal = trial.relative.map(|s| s / norm);
+        let flow = flow.unwrap_or(&normal);
+        let along = contract(&normal, &change) + contract_shears(&normal, &change);
+        let next: Voigt =
+            std::array::from_fn(|i| flow[i] + length * (normal[i] - flow[i]) + (change[i] - along * flow[i]) / norm);
+        let size = stress_norm(&next).max(1.0);
+        next.map(|w| w / size)
     }
 
     /// Psi(strain + change) - Psi(strain) - sigma(strain) : change, energy per volume: how far Psi is above its tangent. As

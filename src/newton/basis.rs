@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use crate::assembly::flow::Flow;
+
 /// The state whose tangent a factor is of.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Basis {
     /// No element yields.
     Elastic,
-    /// The subdomain had this displacement, one step from what is committed now.
-    At(Arc<Vec<f64>>),
+    /// The subdomain had this displacement, one step from what is committed now, and these directions of flow.
+    At(Arc<Vec<f64>>, Flow),
 }
 
 /// The factors of a subdomain.
@@ -30,7 +32,7 @@ impl Bases {
 
     /// What is made of displacements cannot be made again once their history has changed.
     pub fn commit(&mut self) {
-        let is_plastic = |basis: &Option<Basis>| matches!(basis, Some(Basis::At(_)));
+        let is_plastic = |basis: &Option<Basis>| matches!(basis, Some(Basis::At(..)));
         if is_plastic(&self.factor) || is_plastic(&self.interior) {
             self.factor = None;
         }

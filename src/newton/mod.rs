@@ -1,7 +1,8 @@
 //! Semismooth Newton for `min J(v) = Psi(v) - f'v` over the admissible displacements (paper, section 3).
 //!
 //! `J` is convex and every iterate is made feasible, so the step of the quadratic model is a descent direction and the
-//! method, damped by `J`, converges from anywhere; where it is damped much, [`secant`] helps. [`step`] is the only place where
+//! method, damped by `J`, converges from anywhere; the direction of plastic flow is an unknown of its own
+//! ([`crate::assembly::flow`]), that steps are seldom damped. [`step`] is the only place where
 //! FETI and the QP solvers meet.
 
 pub mod basis;
@@ -19,7 +20,6 @@ pub mod program;
 pub mod recover;
 pub mod refine;
 pub mod residuals;
-pub mod secant;
 pub mod step;
 
 pub use certificate::Certificate;
@@ -225,7 +225,6 @@ pub fn solve(
     if let Some(held) = held {
         lambda = solver.expect(problem, &state, held);
     }
-    let mut secant = steps.last().map_or(0.0, |step: &StepRecord| secant::next(solver.secant(), step.damping));
     let mut residuals = problem.residuals(&u, &state, &lambda);
     let mut admissible = !steps.is_empty() || problem.is_admissible(&u);
     let mut attempts: Vec<step::Step> = Vec::new();
@@ -248,7 +247,7 @@ pub fn solve(
         if problem.is_linear() && settings.accuracy.is_none() {
             forcing.drop = solver.linear_drop();
         }
-        let step = match solver.solve(problem, (&u, &state, secant), forcing, timer, &|n| alive(steps.len() + 1, n)) {
+        let step = match solver.solve(problem, (&u, &state), forcing, timer, &|n| alive(steps.len() + 1, n)) {
             Ok(step) => step,
             Err(message) => break Outcome::Singular(message),
         };
@@ -276,9 +275,9 @@ pub fn solve(
             continue;
         };
         let criterion = timer.time("residuals", || problem.relative_change(&u, &damped.u, &damped.state.terms));
+        timer.time("internal forces", || solver.follow(problem, (&u, &state), &damped.u, damped.length));
         u = damped.u;
         state = damped.state;
-        secant = secant::next(secant, damped.length);
         lambda = step.lambda;
         admissible = true;
         let before = residuals.largest();

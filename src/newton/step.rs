@@ -11,6 +11,7 @@ use super::problem::{State, TornProblem, dot};
 use super::program::{Found, ProgramSettings, ProgramState, Programs};
 use super::recover;
 use super::refine::refine;
+use crate::assembly::flow::{self, Flow};
 use crate::assembly::stiffness;
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
@@ -56,8 +57,8 @@ pub struct Step {
 pub struct SolverState {
     /// Of the quadratic programs.
     pub programs: ProgramState,
-    /// Share of the secant stiffness in the last step.
-    pub secant: f64,
+    /// Directions of flow in each own subdomain.
+    pub flows: Vec<Flow>,
     /// What new factors are stored in at least.
     pub precision: Precision,
     /// What the factors of each own subdomain are of.
@@ -70,8 +71,8 @@ pub struct StepSolver<'a> {
     pub(super) projector: Projector<'a>,
     preconditioner: Option<Preconditioner<'a>>,
     pub(super) programs: Programs,
-    /// Share of the secant stiffness in all factors of subdomains that yield.
-    secant: f64,
+    /// Directions of flow in each own subdomain.
+    flows: Vec<Flow>,
     /// Congruent subdomains have the same number.
     twins: Vec<Option<usize>>,
     /// Lower values of each own subdomain's tangent, as it was factorised.
@@ -93,13 +94,15 @@ impl<'a> StepSolver<'a> {
     ) -> Self {
         let (tangents, bases) = (vec![Rc::default(); twins.len()], vec![Bases::default(); twins.len()]);
         let (programs, assembled) = (Programs::new(settings), Vec::new());
-        Self { operator, projector, preconditioner, programs, secant: 0.0, twins, tangents, bases, assembled }
+        let flows = vec![Flow::default(); twins.len()];
+        Self { operator, projector, preconditioner, programs, flows, twins, tangents, bases, assembled }
     }
 
     /// What the next steps depend on.
     pub fn state(&self) -> SolverState {
         let precision = self.operator.factors.precision();
-        SolverState { programs: self.programs.state(), secant: self.secant, precision, bases: self.bases.clone() }
+        let (flows, bases) = (self.flows.clone(), self.bases.clone());
+        SolverState { programs: self.programs.state(), flows, precision, bases }
     }
 
     /// Goes on from such a state, with the multipliers that belong to it: makes the factors again, to the same bits.
@@ -114,8 +117,8 @@ impl<'a> StepSolver<'a> {
         lambda: &[f64],
         timer: &Timer,
     ) -> Result<(), String> {
-        let SolverState { programs, secant, precision, bases } = state;
-        self.secant = secant;
+        let SolverState { programs, flows, precision, bases } = state;
+        self.flows = flows;
         self.programs.resume(&self.projector.coarse, programs, lambda);
         self.operator.factors.set_precision(precision);
         let mut failure = None;
@@ -163,13 +166,13 @@ impl<'a> StepSolver<'a> {
         match basis {
             Basis::Elastic => {
                 let (material, rest) = (Material { yield_stress: None, ..*material }, vec![0.0; subdomain.dofs()]);
-                stiffness::assemble(subdomain, &material, &[], (&rest, 0.0), pattern, &mut values)
+                stiffness::assemble(subdomain, &material, &[], (&rest, &[]), pattern, &mut values)
             }
-            Basis::At(u) => stiffness::assemble(
+            Basis::At(u, flow) => stiffness::assemble(
                 subdomain,
                 material,
                 problem.committed.history(own),
-                (u, self.secant),
+                (u, flow),
                 pattern,
                 &mut values,
             ),
@@ -226,7 +229,7 @@ impl<'a> StepSolver<'a> {
     /// larger than earlier ones.
     pub fn begin(&mut self) {
         self.programs.begin();
-        self.secant = 0.0;
+        self.flows.fill(Flow::default());
         self.bases.iter_mut().for_each(Bases::commit);
     }
 
@@ -246,26 +249,34 @@ impl<'a> StepSolver<'a> {
         }
     }
 
-    /// Share of the secant stiffness in the last step.
-    pub fn secant(&self) -> f64 {
-        self.secant
+    /// Takes the directions of flow along in a step of this `length` from `u` to `next`.
+    pub fn follow(&mut self, problem: &TornProblem, (u, state): (&Torn, &State), next: &Torn, length: f64) {
+        for (own, flow) in self.flows.iter_mut().enumerate() {
+            if state.yielding[own] == 0 {
+                *flow = Flow::default();
+                continue;
+            }
+            let change: Vec<f64> = next[own].iter().zip(&u[own]).map(|(next, u)| next - u).collect();
+            let (subdomain, material) = (&problem.subdomains[own], &problem.materials[own]);
+            let (history, step) = (problem.committed.history(own), (&change[..], length));
+            *flow = Arc::new(flow::follow(subdomain, material, history, flow, &u[own], step));
+        }
     }
 
-    /// Solves for the step at `u`, with a share of the `secant` stiffness; `alive` is told the applications of F so far.
-    /// Collective.
+    /// Solves for the step at `u`; `alive` is told the applications of F so far. Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent or the coarse problem is singular.
     pub fn solve(
         &mut self,
         problem: &TornProblem,
-        (u, state, secant): (&Torn, &State, f64),
+        (u, state): (&Torn, &State),
         forcing: Forcing,
         timer: &Timer,
         alive: &dyn Fn(usize),
     ) -> Result<Step, String> {
         let before = self.operator.applications();
-        let factorisations = self.update_tangents(problem, (u, state, secant), forcing.left, timer)?;
+        let factorisations = self.update_tangents(problem, (u, state), forcing.left, timer)?;
         let rows = problem.gather.rows();
 
         let forces = problem.unbalance(state);
@@ -373,13 +384,10 @@ impl<'a> StepSolver<'a> {
     fn update_tangents(
         &mut self,
         problem: &TornProblem,
-        (u, state, secant): (&Torn, &State, f64),
+        (u, state): (&Torn, &State),
         left: f64,
         timer: &Timer,
     ) -> Result<usize, String> {
-        // All factors are of one share: that is all to know to make them again.
-        let keep = secant == 0.0 && self.secant == 0.0;
-        self.secant = secant;
         let mut failure: Option<NotDefinite> = None;
         let mut factorised = Vec::with_capacity(u.len());
         for (own, subdomain) in problem.subdomains.iter().enumerate() {
@@ -398,20 +406,24 @@ impl<'a> StepSolver<'a> {
             let pattern = &self.operator.factors.symbolic(own).pattern;
             let (material, history) = (&problem.materials[own], problem.committed.history(own));
             self.assembled.resize(pattern.rows.len(), 0.0);
-            let assembled = &mut self.assembled;
+            let (assembled, flow) = (&mut self.assembled, &self.flows[own]);
             timer.time("assembly", || {
-                stiffness::assemble(subdomain, material, history, (&u[own], secant), pattern, assembled)
+                stiffness::assemble(subdomain, material, history, (&u[own], flow), pattern, assembled)
             });
             let known = self.bases[own].factor.is_some();
             let change = if known { pattern.difference(&self.tangents[own], assembled) } else { f64::INFINITY };
             // Where twins are elastic on other ranks only, it gets what it would get from one of them here.
             let common = elastic && self.twins[own].is_some();
-            if keep && change <= left && !common {
+            if change <= left && !common {
                 factorised.push(0.0);
                 continue;
             }
             factorised.push(1.0);
-            let basis = if elastic { Basis::Elastic } else { Basis::At(Arc::new(u[own].clone())) };
+            let basis = if elastic {
+                Basis::Elastic
+            } else {
+                Basis::At(Arc::new(u[own].clone()), Flow::clone(&self.flows[own]))
+            };
             self.bases[own].drift += change;
             self.bases[own].factor = Some(basis.clone());
             let values = Rc::new(assembled.clone());
@@ -421,7 +433,7 @@ impl<'a> StepSolver<'a> {
             timer.count("factorisation", factors.symbolic(own).analysis().flops(), 0.0);
             let drift = self.bases[own].drift;
             failure = match outcome {
-                Ok(()) if common || !keep || drift.is_nan() || drift > DRIFT => {
+                Ok(()) if common || drift.is_nan() || drift > DRIFT => {
                     self.take_interior(own, subdomain.id, &values, basis, common, timer).err()
                 }
                 outcome => outcome.err(),

@@ -19,6 +19,7 @@ use self::same::Miss;
 use super::meshes::fingerprints;
 use super::places::key;
 use super::{Discrete, Standing};
+use crate::assembly::flow::Flow;
 use crate::comm::Comm;
 use crate::constraint::{Kind, Row};
 use crate::feti::Torn;
@@ -58,7 +59,6 @@ struct Numbers {
     norm: Option<f64>,
     has_kept: bool,
     is_double: bool,
-    secant: f64,
     rows: Vec<StepRow>,
     times: Vec<f64>,
 }
@@ -113,6 +113,7 @@ struct Arrays {
     last_lambda: Vec<f64>,
     /// The rows that multipliers act on.
     kept: Vec<bool>,
+    flows: Vec<Flow>,
     bases: Vec<Bases>,
     histories: Vec<Vec<History>>,
     point_data: Vec<Field>,
@@ -147,7 +148,6 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         norm,
         has_kept: kept.is_some(),
         is_double: solver.precision == Precision::Double,
-        secant: solver.secant,
         rows,
         times: recorded.times,
     };
@@ -209,6 +209,19 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         ),
         Field::scalar("histories/kappa", histories.iter().map(|history| history.kappa).collect()),
     ];
+    let of_basis = |basis: &Option<Basis>| match basis {
+        Some(Basis::At(_, flow)) => Flow::clone(flow),
+        _ => Flow::default(),
+    };
+    let of_bases = |bases: &[Option<Basis>]| bases.iter().map(of_basis).collect();
+    for (name, flows) in
+        [("flow", solver.flows), ("factor_flow", of_bases(&factor)), ("interior_flow", of_bases(&interior))]
+    {
+        arrays
+            .push(Field::integer(&format!("subdomains/{name}"), flows.iter().map(|flow| flow.len() as i64).collect()));
+        let directions = Values::Real(flows.iter().flat_map(|flow| flow.iter().flatten().copied()).collect());
+        arrays.push(Field::of(&format!("{name}/direction"), 6, directions));
+    }
     for (group, fields) in [("point_fields", recorded.point_data), ("cell_fields", recorded.cell_data)] {
         arrays.extend(fields.into_iter().map(|field| Field { name: format!("{group}/{}", field.name), ..field }));
     }
@@ -229,25 +242,25 @@ fn code(basis: &Option<Basis>) -> i64 {
     match basis {
         None => 0,
         Some(Basis::Elastic) => 1,
-        Some(Basis::At(_)) => 2,
+        Some(Basis::At(..)) => 2,
     }
 }
 
 /// Zeros where the basis is none.
 fn displacements(bases: &[Option<Basis>], mut zero: Torn) -> Vec<f64> {
     for (basis, zero) in bases.iter().zip(&mut zero) {
-        if let Some(Basis::At(u)) = basis {
+        if let Some(Basis::At(u, _)) = basis {
             zero.clone_from(u);
         }
     }
     zero.concat()
 }
 
-fn basis(code: i64, u: Vec<f64>) -> Option<Basis> {
+fn basis(code: i64, u: Vec<f64>, flow: Flow) -> Option<Basis> {
     match code {
         0 => None,
         1 => Some(Basis::Elastic),
-        _ => Some(Basis::At(Arc::new(u))),
+        _ => Some(Basis::At(Arc::new(u), flow)),
     }
 }
 
@@ -319,7 +332,7 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
         lambda: arrays.lambda,
         held,
         forcing: numbers.forcing,
-        solver: SolverState { programs, secant: numbers.secant, precision, bases: arrays.bases },
+        solver: SolverState { programs, flows: arrays.flows, precision, bases: arrays.bases },
         steps: numbers.own_steps,
     };
     let committed = Committed { histories: arrays.histories, sizes: numbers.sizes };

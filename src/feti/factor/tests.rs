@@ -48,7 +48,7 @@ fn k_times_its_generalised_inverse_times_k_is_k() {
             for (own, subdomain) in setup.subdomains().iter().enumerate() {
                 for u in [vec![0.0; subdomain.dofs()], stretched(subdomain)] {
                     let mut values = vec![0.0; factors.symbolic(own).pattern.rows.len()];
-                    stiffness::assemble(subdomain, &STEEL, &[], (&u, 0.0), &factors.symbolic(own).pattern, &mut values);
+                    stiffness::assemble(subdomain, &STEEL, &[], (&u, &[]), &factors.symbolic(own).pattern, &mut values);
                     factors.factorise(own, subdomain, &values, false).expect("stiff up to rigid motions");
                     let times = |factors: &Factors, x: &[f64]| {
                         let mut y = vec![0.0; x.len()];

@@ -1,11 +1,13 @@
 //! Arrays of a checkpoint on other subdomains of the same meshes.
 //!
 //! Displacements and fields go by node, histories and fields of cells by element, contact by slave node. Multipliers of
-//! gluing and factors are left behind: they are of the subdomains there, and are made anew from the rest.
+//! gluing and factors are left behind: they are of the subdomains there, and are made anew from the rest. So are directions of
+//! plastic flow, which begin as those of the stress.
 
 use std::collections::HashMap;
 
 use super::{Arrays, Recorded, contact};
+use crate::assembly::flow::Flow;
 use crate::comm::Comm;
 use crate::material::History;
 use crate::newton::basis::Bases;
@@ -50,6 +52,7 @@ pub(super) fn read(
         lambda: vec![0.0; rows.len()],
         last_lambda,
         kept,
+        flows: vec![Flow::default(); subdomains.len()],
         bases: vec![Bases::default(); subdomains.len()],
         histories: histories(discrete, file, &places, &cells)?,
         point_data: of_points.read(

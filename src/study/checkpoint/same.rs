@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::{Arrays, Recorded, basis, lowest_node};
+use crate::assembly::flow::Flow;
 use crate::comm::{Comm, Shares};
 use crate::feti::Torn;
 use crate::feti::space::RowSpace;
@@ -70,9 +71,15 @@ pub(super) fn read(
         & rows.read::<i64>(file, "rows/node", 0)?.into_iter().eq(of_rows);
     demand(same)?;
     let torn = |name: &str| -> Result<Torn, String> { Ok(points.split(points.read(file, name, 0)?, 3)) };
-    let bases = |name: &str| -> Result<Vec<Option<Basis>>, String> {
+    let flows = |name: &str| -> Result<Vec<Flow>, Miss> {
+        let part = part(name, &|_| None)?;
+        let directions = part.split(part.read::<f64>(file, &format!("{name}/direction"), 0)?, 6);
+        Ok(directions.into_iter().map(|flow| Flow::new(flow.as_chunks::<6>().0.to_vec())).collect())
+    };
+    let bases = |name: &str| -> Result<Vec<Option<Basis>>, Miss> {
         let codes = alone.read::<i64>(file, &format!("subdomains/{name}"), 0)?;
-        Ok(codes.into_iter().zip(torn(&format!("points/{name}"))?).map(|(code, u)| basis(code, u)).collect())
+        let (torn, flows) = (torn(&format!("points/{name}"))?, flows(&format!("{name}_flow"))?);
+        Ok(codes.into_iter().zip(torn).zip(flows).map(|((code, u), flow)| basis(code, u, flow)).collect())
     };
     let drift = alone.read::<f64>(file, "subdomains/drift", 0)?;
     let (factor, interior) = (bases("factor")?, bases("interior")?);
@@ -101,6 +108,7 @@ pub(super) fn read(
         lambda: column(0),
         last_lambda: column(1),
         kept: of_rows.iter().map(|row| row[2] == 1).collect(),
+        flows: flows("flow")?,
         bases,
         histories: histories.split(remembered, 1),
         point_data: of_points
