@@ -275,9 +275,7 @@ pub fn solve(
             continue;
         };
         let criterion = timer.time("residuals", || problem.relative_change(&u, &damped.u, &damped.state.terms));
-        timer.time("internal forces", || solver.follow(problem, (&u, &state), &damped.u, damped.length));
-        u = damped.u;
-        state = damped.state;
+        let left = (std::mem::replace(&mut u, damped.u), std::mem::replace(&mut state, damped.state));
         lambda = step.lambda;
         admissible = true;
         let before = residuals.largest();
@@ -321,6 +319,7 @@ pub fn solve(
         if steps.len() >= settings.limit {
             break Outcome::LimitReached;
         }
+        timer.time("internal forces", || solver.follow(problem, (&left.0, &left.1), &u, damped.length));
     };
     if errors.is_none() && !steps.is_empty() && state.energy.is_finite() && outcome != Outcome::Stopped {
         errors = Some(solver.errors(problem, (&u, &state), &lambda, timer));
