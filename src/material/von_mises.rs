@@ -82,8 +82,7 @@ impl Trial {
         let (bulk, mu) = (material.bulk_modulus(), material.shear_modulus());
         let elastic: Voigt = std::array::from_fn(|i| strain[i] - committed.plastic_strain[i]);
         let volume = trace(&elastic);
-        let d = deviator(&elastic);
-        let s = [2.0 * mu * d[0], 2.0 * mu * d[1], 2.0 * mu * d[2], mu * d[3], mu * d[4], mu * d[5]];
+        let s = material.deviatoric_stress(&elastic);
         let back = material.back_stress(committed);
         let relative: Voigt = std::array::from_fn(|i| s[i] - back[i]);
         let q = equivalent(&relative);
@@ -117,15 +116,22 @@ impl Trial {
     }
 }
 
-/// The shears' share of the double contraction of two stress-like tensors, once.
-fn contract_shears(a: &Voigt, b: &Voigt) -> f64 {
-    a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+/// The double contraction of two stress-like tensors: shears count twice.
+fn contract_stresses(a: &Voigt, b: &Voigt) -> f64 {
+    contract(a, b) + (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
 }
 
 impl Material {
     /// 3 mu + H + C: what the equivalent stress falls by, beyond the yield surface, for a unit of plastic strain.
     fn plastic_modulus(&self) -> f64 {
         3.0 * self.shear_modulus() + self.hardening + self.kinematic_hardening
+    }
+
+    /// 2 mu dev strain, the deviator of the stress of an elastic strain.
+    #[inline]
+    fn deviatoric_stress(&self, strain: &Voigt) -> Voigt {
+        let (mu, d) = (self.shear_modulus(), deviator(strain));
+        [2.0 * mu * d[0], 2.0 * mu * d[1], 2.0 * mu * d[2], mu * d[3], mu * d[4], mu * d[5]]
     }
 
     /// The back stress 2/3 C plastic_strain, a deviator.
@@ -192,8 +198,7 @@ impl Material {
         (change, length): (&Voigt, f64),
     ) -> Voigt {
         let trial = Trial::new(self, strain, committed);
-        let (mu, d) = (self.shear_modulus(), deviator(change));
-        let change = [2.0 * mu * d[0], 2.0 * mu * d[1], 2.0 * mu * d[2], mu * d[3], mu * d[4], mu * d[5]];
+        let change = self.deviatoric_stress(change);
         if !trial.plastic() {
             let moved: Voigt = std::array::from_fn(|i| trial.relative[i] + change[i]);
             let norm = stress_norm(&moved);
@@ -202,7 +207,7 @@ impl Material {
         let norm = stress_norm(&trial.relative);
         let normal = trial.relative.map(|s| s / norm);
         let flow = flow.unwrap_or(&normal);
-        let along = contract(&normal, &change) + contract_shears(&normal, &change);
+        let along = contract_stresses(&normal, &change);
         let next: Voigt =
             std::array::from_fn(|i| flow[i] + length * (normal[i] - flow[i]) + (change[i] - along * flow[i]) / norm);
         let size = stress_norm(&next).max(1.0);
@@ -213,8 +218,7 @@ impl Material {
     /// accurate for small changes as for large ones.
     pub fn divergence(&self, strain: &Voigt, change: &Voigt, committed: &History) -> f64 {
         let trial = Trial::new(self, strain, committed);
-        let (mu, volume, d) = (self.shear_modulus(), trace(change), deviator(change));
-        let s = [2.0 * mu * d[0], 2.0 * mu * d[1], 2.0 * mu * d[2], mu * d[3], mu * d[4], mu * d[5]];
+        let (mu, volume, s) = (self.shear_modulus(), trace(change), self.deviatoric_stress(change));
         let square = equivalent(&s).powi(2);
         let elastic = 0.5 * self.bulk_modulus() * volume * volume + square / (6.0 * mu);
         let moved: Voigt = std::array::from_fn(|i| trial.relative[i] + s[i]);
@@ -224,7 +228,7 @@ impl Material {
             return elastic;
         }
         // The equivalent stress q grows by (2 along + square) / (after + before); to first order by along / before.
-        let along = 1.5 * (contract(&trial.relative, &s) + contract_shears(&trial.relative, &s));
+        let along = 1.5 * contract_stresses(&trial.relative, &s);
         let growth = (2.0 * along + square) / (after + before);
         let (of_excess, beyond) = match (trial.excess > 0.0, excess > 0.0) {
             (true, true) => (growth, 0.0),

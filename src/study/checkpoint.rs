@@ -213,12 +213,11 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         Some(Basis::At(_, flow)) => Flow::clone(flow),
         _ => Flow::default(),
     };
-    let of_bases = |bases: &[Option<Basis>]| bases.iter().map(of_basis).collect();
-    for (name, flows) in
-        [("flow", solver.flows), ("factor_flow", of_bases(&factor)), ("interior_flow", of_bases(&interior))]
+    let flows = |bases: &[Option<Basis>]| bases.iter().map(of_basis).collect();
+    for (name, flows) in [("flow", solver.flows), ("factor_flow", flows(&factor)), ("interior_flow", flows(&interior))]
     {
-        arrays
-            .push(Field::integer(&format!("subdomains/{name}"), flows.iter().map(|flow| flow.len() as i64).collect()));
+        let counts = flows.iter().map(|flow| flow.len() as i64).collect();
+        arrays.push(Field::integer(&format!("subdomains/{name}"), counts));
         let directions = Values::Real(flows.iter().flat_map(|flow| flow.iter().flatten().copied()).collect());
         arrays.push(Field::of(&format!("{name}/direction"), 6, directions));
     }
