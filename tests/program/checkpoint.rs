@@ -176,7 +176,7 @@ fn a_signal_to_the_ranks_themselves_stops_the_run_as_one_by_mpirun() {
     let more = ["--qp", "smalse-m", "--preconditioner", "none", "--checkpoint-every", "0.000001"];
     let end = run_disturbed(2, &solve(out.path(), &[], &more), |launcher| {
         // The first checkpoint says that the run is under way.
-        wait_for(&checkpoint(out.path()));
+        wait_for(&checkpoint(out.path()), 1);
         children(launcher).into_iter().for_each(|rank| send("TERM", rank));
     });
     assert_eq!(end.code, 75, "{}{}", end.stdout, end.stderr);

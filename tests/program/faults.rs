@@ -7,7 +7,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use crate::common::fields::Fields;
-use crate::common::{End, children, on_one_machine, run_disturbed, run_in_small_room, send};
+use crate::common::{End, children, on_one_machine, run_disturbed, run_in_small_room, send, wait_for};
 use fetiplast::comm::Comm;
 use fetiplast::comm::world::World;
 
@@ -36,12 +36,11 @@ fn assert_untouched(out: &Path, earlier: &[u8]) {
     assert!(!Fields::read(&file).displacement.is_empty());
 }
 
-fn kill_a_rank(delay: f64, arguments: &[&str]) -> End {
+/// Kills the last rank of a run when it has written so many checkpoints.
+fn kill_a_rank(checkpoint: &Path, written: usize, arguments: &[&str]) -> End {
     run_disturbed(2, arguments, |launcher| {
-        sleep(Duration::from_secs_f64(delay));
-        if let Some(rank) = children(launcher).last() {
-            send("KILL", *rank);
-        }
+        wait_for(checkpoint, written);
+        send("KILL", *children(launcher).last().expect("ranks are running"));
     })
 }
 
@@ -50,17 +49,13 @@ fn a_killed_rank_ends_the_run_and_leaves_results_and_checkpoints() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path();
     let result = earlier(out);
-    let mut killed = 0;
-    for delay in [0.3, 0.8, 1.5] {
-        let end = kill_a_rank(delay, &long(out, &["--checkpoint-every", "0.000001"]));
-        assert!(end.seconds < SOON, "{} s", end.seconds);
-        if end.code != 0 {
-            killed += 1;
-            assert_untouched(out, &result);
-        }
-    }
-    assert!(killed > 0, "no run was still there to be killed");
     let file = out.join("two-blocks.checkpoint.h5");
+    for written in [1, 2, 4] {
+        let end = kill_a_rank(&file, written, &long(out, &["--checkpoint-every", "0.000001"]));
+        assert!(end.seconds < SOON, "{} s", end.seconds);
+        assert!(end.code != 0, "{}", end.stdout);
+        assert_untouched(out, &result);
+    }
     let end = run_disturbed(2, &["resume", file.to_str().unwrap()], |_| ());
     assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
 }

@@ -210,11 +210,16 @@ pub fn children(process: u32) -> Vec<u32> {
     text.split_whitespace().map(|child| child.parse().unwrap()).collect()
 }
 
-/// Waits until a file is there, not for ever.
-pub fn wait_for(file: &Path) {
-    let start = Instant::now();
-    while !file.exists() && start.elapsed() < TIME_LIMIT {
-        sleep(Duration::from_millis(5));
+/// Waits until a file has been written, anew, so many times; not for ever.
+pub fn wait_for(file: &Path, times: usize) {
+    let written = || fs::metadata(file).and_then(|data| data.modified()).ok();
+    let (start, mut last, mut seen) = (Instant::now(), written(), 0);
+    while seen < times && start.elapsed() < TIME_LIMIT {
+        sleep(Duration::from_millis(2));
+        let now = written();
+        if now.is_some() && now != last {
+            (last, seen) = (now, seen + 1);
+        }
     }
 }
 
