@@ -21,6 +21,7 @@ pub mod recover;
 pub mod refine;
 pub mod residuals;
 pub mod step;
+pub mod tangents;
 
 pub use certificate::Certificate;
 pub use committed::Committed;

@@ -1,9 +1,8 @@
 //! One Newton step: tangents, factors, the dual quadratic program, and back to a displacement.
 
-use std::rc::Rc;
 use std::sync::Arc;
 
-use super::basis::{Bases, Basis};
+use super::basis::Bases;
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
 use super::motion;
@@ -11,8 +10,8 @@ use super::problem::{State, TornProblem, dot};
 use super::program::{Found, ProgramSettings, ProgramState, Programs};
 use super::recover;
 use super::refine::refine;
+use super::tangents::{Factorising, Tangents};
 use crate::assembly::flow::{self, Flow};
-use crate::assembly::stiffness;
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::factor::NotDefinite;
@@ -20,14 +19,8 @@ use crate::feti::operator::DualOperator;
 use crate::feti::preconditioner::Preconditioner;
 use crate::feti::projector::Projector;
 use crate::feti::scaling::Scaling;
-use crate::material::Material;
 use crate::monitor::timing::Timer;
 use crate::qp::{Outcome, Statistics};
-
-/// Change of a tangent's entries, relative to its diagonal, that the preconditioner does not follow. (On the benchmark at
-/// level 2, 0.1 saves a quarter of its factorisations and costs no iteration; 0.3 saves three fifths, and costs a tenth
-/// more iterations.)
-const DRIFT: f64 = 0.1;
 
 /// Residual of the subdomains' problems that is small enough whatever the accuracy of the step.
 const EXACT: f64 = 1e-8;
@@ -73,14 +66,7 @@ pub struct StepSolver<'a> {
     pub(super) programs: Programs,
     /// Directions of flow in each own subdomain.
     flows: Vec<Flow>,
-    /// Congruent subdomains have the same number.
-    twins: Vec<Option<usize>>,
-    /// Lower values of each own subdomain's tangent, as it was factorised.
-    tangents: Vec<Rc<Vec<f64>>>,
-    /// What its factors are of.
-    bases: Vec<Bases>,
-    /// Scratch: a tangent that may be worth factorising.
-    assembled: Vec<f64>,
+    tangents: Tangents,
 }
 
 impl<'a> StepSolver<'a> {
@@ -92,16 +78,15 @@ impl<'a> StepSolver<'a> {
         settings: ProgramSettings,
         twins: Vec<Option<usize>>,
     ) -> Self {
-        let (tangents, bases) = (vec![Rc::default(); twins.len()], vec![Bases::default(); twins.len()]);
-        let (programs, assembled) = (Programs::new(settings), Vec::new());
         let flows = vec![Flow::default(); twins.len()];
-        Self { operator, projector, preconditioner, programs, flows, twins, tangents, bases, assembled }
+        let (programs, tangents) = (Programs::new(settings), Tangents::new(twins));
+        Self { operator, projector, preconditioner, programs, flows, tangents }
     }
 
     /// What the next steps depend on.
     pub fn state(&self) -> SolverState {
         let precision = self.operator.factors.precision();
-        let (flows, bases) = (self.flows.clone(), self.bases.clone());
+        let (flows, bases) = (self.flows.clone(), self.tangents.bases().to_vec());
         SolverState { programs: self.programs.state(), flows, precision, bases }
     }
 
@@ -121,79 +106,9 @@ impl<'a> StepSolver<'a> {
         self.flows = flows;
         self.programs.resume(&self.projector.coarse, programs, lambda);
         self.operator.factors.set_precision(precision);
-        let mut failure = None;
-        for (own, bases) in bases.into_iter().enumerate() {
-            if failure.is_none() && bases.factor.is_some() {
-                failure = self.remake(problem, own, &bases, timer).err();
-            }
-            self.bases[own] = bases;
-        }
-        agree_on(failure, problem)
-    }
-
-    /// Makes the factors of a subdomain again.
-    fn remake(&mut self, problem: &TornProblem, own: usize, bases: &Bases, timer: &Timer) -> Result<(), NotDefinite> {
-        let subdomain = &problem.subdomains[own];
-        let twin = self.twins[own].is_some();
-        if bases.is_elastic()
-            && let Some(outcome) = self.adopt(own, subdomain.id, timer)
-        {
-            outcome?;
-        } else if let Some(basis) = &bases.factor {
-            let common = twin && bases.is_elastic();
-            self.tangents[own] = Rc::new(self.tangent(problem, own, basis));
-            let (factors, values) = (&mut self.operator.factors, &self.tangents[own]);
-            timer.time("factorisation", || factors.factorise(own, subdomain, values, common))?;
-        }
-        let (Some(basis), Some(_)) = (&bases.interior, &self.preconditioner) else { return Ok(()) };
-        if self.bases[own].interior.as_ref() == Some(basis) {
-            return Ok(());
-        }
-        let values = if bases.factor.as_ref() == Some(basis) {
-            Rc::clone(&self.tangents[own])
-        } else {
-            Rc::new(self.tangent(problem, own, basis))
-        };
-        let common = twin && *basis == Basis::Elastic;
-        self.take_interior(own, subdomain.id, &values, basis.clone(), common, timer)
-    }
-
-    /// Lower values of the tangent that a factor is of.
-    fn tangent(&self, problem: &TornProblem, own: usize, basis: &Basis) -> Vec<f64> {
-        let (subdomain, material) = (&problem.subdomains[own], &problem.materials[own]);
-        let pattern = &self.operator.factors.symbolic(own).pattern;
-        let mut values = vec![0.0; pattern.rows.len()];
-        match basis {
-            Basis::Elastic => {
-                let (material, rest) = (Material { yield_stress: None, ..*material }, vec![0.0; subdomain.dofs()]);
-                stiffness::assemble(subdomain, &material, &[], (&rest, &[]), pattern, &mut values)
-            }
-            Basis::At(u, flow) => stiffness::assemble(
-                subdomain,
-                material,
-                problem.committed.history(own),
-                (u, flow),
-                pattern,
-                &mut values,
-            ),
-        };
-        values
-    }
-
-    /// Gives the preconditioner the interior block of these lower values, if there is one.
-    fn take_interior(
-        &mut self,
-        own: usize,
-        id: usize,
-        values: &[f64],
-        basis: Basis,
-        common: bool,
-        timer: &Timer,
-    ) -> Result<(), NotDefinite> {
-        let Some(Preconditioner { schur, .. }) = &mut self.preconditioner else { return Ok(()) };
-        (self.bases[own].interior, self.bases[own].drift) = (Some(basis), 0.0);
-        timer.count("factorisation of the interior", schur.flops(own), 0.0);
-        timer.time("factorisation of the interior", || schur.update(own, id, values, common))
+        let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
+        let outcome = self.tangents.remake(problem, bases, &mut on);
+        agree_on(outcome.err(), problem)
     }
 
     /// Starts from the multipliers that a displacement and the rows that hold there suggest; returns them. They are
@@ -218,11 +133,7 @@ impl<'a> StepSolver<'a> {
     /// Forgets the multipliers and factors of a solve that failed.
     pub fn forget(&mut self) {
         self.programs.forget();
-        self.drop_factors();
-    }
-
-    fn drop_factors(&mut self) {
-        self.bases.iter_mut().for_each(|bases| bases.factor = None);
+        self.tangents.drop_factors();
     }
 
     /// Another solve follows, from what is committed now: its tolerances refer to its own first residual where that is
@@ -230,14 +141,14 @@ impl<'a> StepSolver<'a> {
     pub fn begin(&mut self) {
         self.programs.begin();
         self.flows.fill(Flow::default());
-        self.bases.iter_mut().for_each(Bases::commit);
+        self.tangents.commit();
     }
 
     /// From now on factorises in double precision; false if that was so before.
     pub fn sharpen(&mut self) -> bool {
         let before = self.operator.factors.precision();
         self.operator.factors.set_precision(Precision::Double);
-        self.drop_factors();
+        self.tangents.drop_factors();
         before == Precision::Single
     }
 
@@ -314,7 +225,7 @@ impl<'a> StepSolver<'a> {
             problem.space.sum(&squares, 1)[0].sqrt()
         };
         let (local_residual, refined) = timer.time("refinement", || {
-            refine(&mut self.operator.factors, &self.tangents, &norm, (&local, &mut du), wanted)
+            refine(&mut self.operator.factors, self.tangents.values(), &norm, (&local, &mut du), wanted)
         });
         if refined > 0 {
             self.operator.rejoin(&mut du);
@@ -360,25 +271,6 @@ impl<'a> StepSolver<'a> {
         timer.time("preconditioner", || preconditioner.mend(&defect, du));
     }
 
-    /// Gives an elastic subdomain what an elastic twin has already; `None` if there is none.
-    fn adopt(&mut self, own: usize, id: usize, timer: &Timer) -> Option<Result<(), NotDefinite>> {
-        let class = self.twins[own]?;
-        let elastic = |k: &usize| self.twins[*k] == Some(class) && self.bases[*k].is_elastic();
-        let mut twins = (0..self.twins.len()).filter(elastic);
-        let twin = twins.clone().next()?;
-        let alike = self.preconditioner.as_ref().and_then(|p| twins.find(|&k| p.schur.alike(own, k)));
-        self.operator.factors.share(own, twin);
-        self.tangents[own] = Rc::clone(&self.tangents[twin]);
-        self.bases[own].factor = Some(Basis::Elastic);
-        if let (Some(alike), Some(Preconditioner { schur, .. })) = (alike, &mut self.preconditioner) {
-            (self.bases[own].interior, self.bases[own].drift) = (Some(Basis::Elastic), 0.0);
-            schur.share(own, alike);
-            return Some(Ok(()));
-        }
-        let values = Rc::clone(&self.tangents[own]);
-        Some(self.take_interior(own, id, &values, Basis::Elastic, true, timer))
-    }
-
     /// Assembles the tangents at `u` and factorises those that changed by more than `left`; returns how many, over all
     /// ranks.
     fn update_tangents(
@@ -388,57 +280,8 @@ impl<'a> StepSolver<'a> {
         left: f64,
         timer: &Timer,
     ) -> Result<usize, String> {
-        let mut failure: Option<NotDefinite> = None;
-        let mut factorised = Vec::with_capacity(u.len());
-        for (own, subdomain) in problem.subdomains.iter().enumerate() {
-            // An elastic tangent that was elastic before is the same matrix.
-            let unchanged = self.bases[own].is_elastic() && state.yielding[own] == 0;
-            if unchanged || failure.is_some() {
-                factorised.push(0.0);
-                continue;
-            }
-            let elastic = state.yielding[own] == 0;
-            if elastic && let Some(outcome) = self.adopt(own, subdomain.id, timer) {
-                factorised.push(1.0);
-                failure = outcome.err();
-                continue;
-            }
-            let pattern = &self.operator.factors.symbolic(own).pattern;
-            let (material, history) = (&problem.materials[own], problem.committed.history(own));
-            self.assembled.resize(pattern.rows.len(), 0.0);
-            let (assembled, flow) = (&mut self.assembled, &self.flows[own]);
-            timer.time("assembly", || {
-                stiffness::assemble(subdomain, material, history, (&u[own], flow), pattern, assembled)
-            });
-            let known = self.bases[own].factor.is_some();
-            let change = if known { pattern.difference(&self.tangents[own], assembled) } else { f64::INFINITY };
-            // Where twins are elastic on other ranks only, it gets what it would get from one of them here.
-            let common = elastic && self.twins[own].is_some();
-            if change <= left && !common {
-                factorised.push(0.0);
-                continue;
-            }
-            factorised.push(1.0);
-            let basis = if elastic {
-                Basis::Elastic
-            } else {
-                Basis::At(Arc::new(u[own].clone()), Flow::clone(&self.flows[own]))
-            };
-            self.bases[own].drift += change;
-            self.bases[own].factor = Some(basis.clone());
-            let values = Rc::new(assembled.clone());
-            self.tangents[own] = Rc::clone(&values);
-            let factors = &mut self.operator.factors;
-            let outcome = timer.time("factorisation", || factors.factorise(own, subdomain, &values, common));
-            timer.count("factorisation", factors.symbolic(own).analysis().flops(), 0.0);
-            let drift = self.bases[own].drift;
-            failure = match outcome {
-                Ok(()) if common || drift.is_nan() || drift > DRIFT => {
-                    self.take_interior(own, subdomain.id, &values, basis, common, timer).err()
-                }
-                outcome => outcome.err(),
-            };
-        }
+        let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
+        let (factorised, failure) = self.tangents.update(problem, (u, state, &self.flows), left, &mut on);
         agree_on(failure, problem)?;
         if self.operator.is_hybrid() {
             let loose = timer.time("clusters", || self.operator.update_clusters()).err();
@@ -452,6 +295,7 @@ impl<'a> StepSolver<'a> {
         if let Some(preconditioner) = &mut self.preconditioner {
             let diagonals: Vec<Vec<f64>> = self
                 .tangents
+                .values()
                 .iter()
                 .enumerate()
                 .map(|(own, values)| self.operator.factors.symbolic(own).pattern.diagonal(values))
@@ -461,6 +305,15 @@ impl<'a> StepSolver<'a> {
         }
         Ok(problem.space.sum(&factorised, 1)[0] as usize)
     }
+}
+
+fn factorising<'s>(
+    operator: &'s mut DualOperator,
+    preconditioner: &'s mut Option<Preconditioner>,
+    timer: &'s Timer,
+) -> Factorising<'s> {
+    let schur = preconditioner.as_mut().map(|preconditioner| &mut preconditioner.schur);
+    Factorising { factors: &mut operator.factors, schur, timer }
 }
 
 /// One outcome for all ranks: the lowest failing subdomain speaks; ranks that see no failure repeat its number.
