@@ -111,6 +111,14 @@ impl Pattern {
         largest.sqrt()
     }
 
+    /// An entry of the symmetric matrix with these lower values; zero outside of the pattern.
+    pub fn value(&self, values: &[f64], row: u32, column: u32) -> f64 {
+        let (row, column) = (row.max(column), row.min(column) as usize);
+        let begin = self.column_begin[column] as usize;
+        let rows = &self.rows[begin..self.column_begin[column + 1] as usize];
+        rows.binary_search(&row).map_or(0.0, |at| values[begin + at])
+    }
+
     /// The diagonal of the matrix with these values.
     pub fn diagonal(&self, values: &[f64]) -> Vec<f64> {
         (0..self.dofs()).map(|c| values[self.column_begin[c] as usize]).collect()
@@ -126,9 +134,20 @@ fn pairs(nodes: &[u32]) -> impl Iterator<Item = (u32, u32)> {
 mod tests {
     use super::*;
     use crate::element::Kind;
+    use crate::fixture::dense;
 
     fn tets(nodes: &[[u32; 4]]) -> Elements {
         Elements::new(Kind::Tet4, nodes.concat())
+    }
+
+    #[test]
+    fn entries_are_those_of_the_matrix_on_both_sides_of_the_diagonal() {
+        let pattern = Pattern::new(6, &tets(&[[0, 1, 2, 3], [1, 2, 3, 5]]), &[]);
+        let values: Vec<f64> = (1..=pattern.rows.len()).map(|k| k as f64).collect();
+        let matrix = dense(&pattern, &values);
+        for (row, column) in (0..18).flat_map(|row| (0..18).map(move |column| (row, column))) {
+            assert_eq!(pattern.value(&values, row, column), matrix[(row as usize, column as usize)]);
+        }
     }
 
     #[test]

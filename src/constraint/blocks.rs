@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::contact::Side;
+use super::ties::Ties;
 use super::{ConstraintError, Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, gluing};
 use crate::comm::{Comm, all_gather_u64};
 use crate::contact::ContactPair;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
-/// Nodes tied together by contact, and the pairs that tie them.
+/// Nodes tied together by contact and short edges, and the contact pairs among them.
 #[derive(Default)]
 struct Cluster {
     nodes: BTreeSet<u64>,
@@ -30,10 +31,11 @@ impl Constraints {
     ) -> Result<Self, ConstraintError> {
         let largest = stiffness.iter().copied().fold(0.0, f64::max);
         dirichlet::check(comm, &decomposition.interface, supports)?;
-        let contact_nodes = gather_nodes(comm, decomposition, pairs);
-        let (cluster_of, clusters) = clusters(pairs);
+        let ties = Ties::new(comm, decomposition);
+        let (cluster_of, clusters) = clusters(pairs, &ties);
+        let clustered = gather_nodes(comm, decomposition, &cluster_of);
         let own: HashMap<u64, &InterfaceNode> = decomposition.interface.iter().map(|n| (n.node, n)).collect();
-        let node = |number: u64| contact_nodes.get(&number).or_else(|| own.get(&number).copied());
+        let node = |number: u64| clustered.get(&number).or_else(|| own.get(&number).copied());
 
         let keys: BTreeSet<u64> = own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
         let mut result = Self {
@@ -46,6 +48,7 @@ impl Constraints {
             copies: local_copies(decomposition),
             has_inequalities: !pairs.is_empty(),
             uneven: stiffness.iter().any(|young| young * JUMP <= largest),
+            ties,
             idle: Vec::new(),
         };
         for key in keys {
@@ -112,11 +115,14 @@ fn nodes_of(pair: &ContactPair) -> impl Iterator<Item = u64> {
     contact::nodes(pair).map(|(node, _)| node)
 }
 
-/// Copies and surfaces of all nodes in contact, on every rank.
-fn gather_nodes(comm: &dyn Comm, decomposition: &Decomposition, pairs: &[ContactPair]) -> BTreeMap<u64, InterfaceNode> {
-    let wanted: BTreeSet<u64> = pairs.iter().flat_map(nodes_of).collect();
+/// Copies and surfaces of all nodes of clusters, on every rank.
+fn gather_nodes(
+    comm: &dyn Comm,
+    decomposition: &Decomposition,
+    cluster_of: &HashMap<u64, u64>,
+) -> BTreeMap<u64, InterfaceNode> {
     let mut mine = Vec::new();
-    for node in decomposition.interface.iter().filter(|n| wanted.contains(&n.node)) {
+    for node in decomposition.interface.iter().filter(|n| cluster_of.contains_key(&n.node)) {
         // The rank of the lowest copy speaks for the node.
         if decomposition.own_index(node.copies[0]).is_some() {
             node.pack(&mut mine);
@@ -125,8 +131,8 @@ fn gather_nodes(comm: &dyn Comm, decomposition: &Decomposition, pairs: &[Contact
     InterfaceNode::unpack(&all_gather_u64(comm, &mine)).into_iter().map(|node| (node.node, node)).collect()
 }
 
-/// Connected components of the nodes under the contact pairs, named by their lowest node.
-fn clusters(pairs: &[ContactPair]) -> (HashMap<u64, u64>, BTreeMap<u64, Cluster>) {
+/// Connected components of the nodes under the contact pairs and the ties, named by their lowest node.
+fn clusters(pairs: &[ContactPair], ties: &Ties) -> (HashMap<u64, u64>, BTreeMap<u64, Cluster>) {
     let mut parent: HashMap<u64, u64> = HashMap::new();
     fn root(parent: &mut HashMap<u64, u64>, mut node: u64) -> u64 {
         loop {
@@ -140,11 +146,11 @@ fn clusters(pairs: &[ContactPair]) -> (HashMap<u64, u64>, BTreeMap<u64, Cluster>
             node = further;
         }
     }
-    for pair in pairs {
-        for node in nodes_of(pair) {
-            let (a, b) = (root(&mut parent, pair.slave), root(&mut parent, node));
-            parent.insert(a.max(b), a.min(b));
-        }
+    let of_pairs = pairs.iter().flat_map(|pair| nodes_of(pair).map(|node| (pair.slave, node)));
+    let of_ties = ties.nodes().flat_map(|nodes| nodes.iter().map(|&node| (nodes[0], node)));
+    for (one, other) in of_pairs.chain(of_ties) {
+        let (a, b) = (root(&mut parent, one), root(&mut parent, other));
+        parent.insert(a.max(b), a.min(b));
     }
     let mut clusters: BTreeMap<u64, Cluster> = BTreeMap::new();
     let mut names = HashMap::new();

@@ -7,7 +7,7 @@
 //! stiff ones first, so that stiff ones are not glued by way of a soft one.
 //!
 //! Rows that share a node form a *block*: the gluing and support rows of a node, together with those of the nodes
-//! that contact ties to it. A rank holds every row of every block that one of its subdomains touches, so whatever
+//! that contact, or short edges ([`ties`]), tie to it. A rank holds every row of every block that one of its subdomains touches, so whatever
 //! couples the rows of a block is local. Rows, their order and their coefficients do not depend on the ranks.
 //!
 //! Supports and contact act on the mean over the copies and are therefore orthogonal to gluing (design: "Constraint
@@ -18,10 +18,13 @@ pub mod blocks;
 pub mod contact;
 pub mod dirichlet;
 pub mod gluing;
+pub mod ties;
 
 use std::ops::Range;
 
 use thiserror::Error;
+
+use self::ties::Ties;
 
 /// What a row stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -159,6 +162,8 @@ pub struct Constraints {
     pub has_inequalities: bool,
     /// Whether stiffness jumps, and rows may be of unequal length.
     pub uneven: bool,
+    /// Nodes that short edges tie together.
+    pub ties: Ties,
     /// Contact pairs of own nodes without a row, because supports fix all of their nodes along the normal, and the distance
     /// that is left (length).
     pub idle: Vec<(usize, f64)>,

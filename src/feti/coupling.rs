@@ -23,7 +23,7 @@ impl Coupling {
         let several = constraints.blocks.iter().map(contacts).filter(|rows| rows.len() > 1);
         Self {
             squares: constraints.rows.iter().map(|row| row.length * row.length).collect(),
-            grams: several.map(|rows| Gram::new(constraints, rows)).filter(Gram::is_coupled).collect(),
+            grams: several.map(|rows| Gram::new(constraints, rows, false)).filter(Gram::is_coupled).collect(),
         }
     }
 

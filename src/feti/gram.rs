@@ -1,4 +1,4 @@
-//! `B W B'` on some rows, with `W` diagonal, and its sparse Cholesky factor.
+//! `B W B'` on some rows, and its sparse Cholesky factor. `W` is diagonal, or has blocks for nodes that are tied together.
 
 use super::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use crate::constraint::{Constraints, Term};
@@ -19,58 +19,94 @@ pub struct Gram {
     unknowns: Vec<f64>,
 }
 
-/// Product of two coefficients at one unknown.
+/// Product of two coefficients of one block of `W`.
 struct Product {
     entry: u32,
     rows: [u32; 2],
+    /// Twice where it stands for two, of two coefficients of one row.
     value: f64,
-    slot: u32,
-    axis: u8,
+    sites: [Site; 2],
 }
 
-/// A coefficient: its place among some rows, its slot, and itself.
-pub struct Coefficient<'a> {
-    /// Which of the rows.
-    pub place: usize,
+/// Where a coefficient's unknown is.
+#[derive(Clone, Copy)]
+pub struct Site {
     /// The slot of its node.
-    pub slot: usize,
-    /// The coefficient and its unknown.
-    pub term: &'a Term,
+    pub slot: u32,
+    /// Component.
+    pub axis: u32,
+    /// Place of its node in the group of tied ones, if it is in one.
+    pub tied: Option<u32>,
 }
 
-impl Coefficient<'_> {
-    /// The unknown.
-    pub fn unknown(&self) -> (u32, u64, usize) {
-        (self.term.subdomain, self.term.node, self.term.axis)
+/// A coefficient of B.
+pub struct Coefficient {
+    /// Which of some rows.
+    pub place: usize,
+    /// Itself.
+    pub value: f64,
+    /// Its unknown.
+    pub site: Site,
+    /// The block of `W` that it belongs to.
+    block: Block,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Block {
+    /// One unknown: subdomain, node and component.
+    Unknown(u32, u64, usize),
+    /// The number of a group.
+    Group(u32),
+}
+
+impl Coefficient {
+    /// Whether two belong to one block of `W`.
+    pub fn share_block(&self, other: &Self) -> bool {
+        self.block == other.block
     }
 }
 
-/// Coefficients of some rows by their places, sorted by unknown, then by row.
-pub fn coefficients(constraints: &Constraints, rows: impl Iterator<Item = (usize, usize)>) -> Vec<Coefficient<'_>> {
+/// Coefficients of some rows, given by their places and numbers, sorted by blocks of `W`, then by row. `W` has blocks for tied
+/// nodes, or is diagonal.
+pub fn coefficients(
+    constraints: &Constraints,
+    rows: impl Iterator<Item = (usize, usize)>,
+    tied: bool,
+) -> Vec<Coefficient> {
     let mut all = Vec::new();
     for (place, row) in rows {
         let parts = constraints.rows[row].terms.chunk_by(Term::share_slot);
         for (slot, part) in constraints.slots(row).zip(parts) {
-            all.extend(part.iter().map(|term| Coefficient { place, slot, term }));
+            let group = constraints.ties.place(part[0].subdomain, part[0].node).filter(|_| tied);
+            all.extend(part.iter().map(|term| {
+                let alone = Block::Unknown(term.subdomain, term.node, term.axis);
+                let block = group.map_or(alone, |(number, _)| Block::Group(number));
+                let tied = group.map(|(_, place)| place);
+                Coefficient {
+                    place,
+                    value: term.value,
+                    site: Site { slot: slot as u32, axis: term.axis as u32, tied },
+                    block,
+                }
+            }));
         }
     }
-    all.sort_by_key(|c| (c.unknown(), c.place));
+    all.sort_by_key(|c| (c.block, c.place));
     all
 }
 
 impl Gram {
-    /// Of these rows, ascending.
-    pub fn new(constraints: &Constraints, rows: Vec<usize>) -> Self {
+    /// Of these rows, ascending; `tied` says that `W` has blocks.
+    pub fn new(constraints: &Constraints, rows: Vec<usize>, tied: bool) -> Self {
         let mut products = Vec::new();
-        let coefficients = coefficients(constraints, rows.iter().copied().enumerate());
-        for same in coefficients.chunk_by(|a, b| a.unknown() == b.unknown()) {
+        let coefficients = coefficients(constraints, rows.iter().copied().enumerate(), tied);
+        for same in coefficients.chunk_by(Coefficient::share_block) {
             for (k, a) in same.iter().enumerate() {
-                products.extend(same[..=k].iter().map(|b| Product {
+                products.extend(same[..=k].iter().enumerate().map(|(j, b)| Product {
                     entry: 0,
                     rows: [a.place as u32, b.place as u32],
-                    value: a.term.value * b.term.value,
-                    slot: a.slot as u32,
-                    axis: a.term.axis as u8,
+                    value: if j < k && a.place == b.place { 2.0 } else { 1.0 } * a.value * b.value,
+                    sites: [a.site, b.site],
                 }));
             }
         }
@@ -111,12 +147,12 @@ impl Gram {
         self.row_index.len() > self.rows.len()
     }
 
-    /// Factorises on the kept rows, `weight` being `W` by slot and axis.
-    pub fn factorise(&mut self, weight: impl Fn(usize, usize) -> f64, kept: impl Fn(usize) -> bool) {
+    /// Factorises on the kept rows, `weight` being `W` between two unknowns of a block.
+    pub fn factorise(&mut self, weight: impl Fn(Site, Site) -> f64, kept: impl Fn(usize) -> bool) {
         self.kept.iter_mut().zip(&self.rows).for_each(|(k, &row)| *k = kept(row));
         self.values.fill(0.0);
         for p in self.products.iter().filter(|p| p.rows.iter().all(|&row| self.kept[row as usize])) {
-            self.values[p.entry as usize] += p.value * weight(p.slot as usize, p.axis.into());
+            self.values[p.entry as usize] += p.value * weight(p.sites[0], p.sites[1]);
         }
         // The identity fills the place of the others: one analysis serves all sets.
         for (column, _) in self.kept.iter().enumerate().filter(|(_, kept)| !**kept) {
@@ -141,7 +177,7 @@ impl Gram {
         }
     }
 
-    /// `y -= B B' x` on its rows, kept or not; `y` is by place.
+    /// `y -= B B' x` on its rows, kept or not, where `W` has no blocks; `y` is by place.
     pub fn subtract_product(&self, x: &[f64], y: &mut [f64]) {
         for Product { rows: [a, b], value, .. } in &self.products {
             let (a, b) = (*a as usize, *b as usize);
@@ -172,7 +208,7 @@ mod tests {
             let constraints = &setup.discrete.constraints;
             let largest = constraints.blocks.iter().max_by_key(|rows| rows.len()).expect("there are rows").clone();
             let n = largest.len();
-            let mut gram = Gram::new(constraints, largest.clone().collect());
+            let mut gram = Gram::new(constraints, largest.clone().collect(), false);
             assert!(gram.is_coupled() && n > 100, "{n}");
             // Dense, by the rows' own terms.
             let product = |weighted: bool| {
@@ -194,7 +230,7 @@ mod tests {
             let x = setup.multipliers(1);
             for some in [false, true] {
                 let kept = |row: usize| !some || !row.is_multiple_of(3);
-                gram.factorise(|slot, axis| weights[slot][axis], kept);
+                gram.factorise(|site, _| weights[site.slot as usize][site.axis as usize], kept);
                 let mut y = vec![f64::NAN; x.len()];
                 gram.solve(&x, &mut y);
                 let list: Vec<usize> = (0..n).filter(|k| kept(largest.start + k)).collect();

@@ -10,6 +10,7 @@ pub mod coarse;
 pub mod coupling;
 pub mod face;
 pub mod factor;
+pub mod flexibility;
 pub mod gather;
 pub mod gram;
 pub mod hybrid;

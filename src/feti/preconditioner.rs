@@ -62,10 +62,10 @@ impl<'a> Preconditioner<'a> {
         self.displace(x);
         self.schur.apply(&self.displacements, &mut self.forces);
         for (own, torn) in self.torn.iter_mut().enumerate() {
+            let (boundary, forces) = (self.schur.boundary(own), &mut self.forces[own]);
+            self.scaling.flexibility.apply(own, boundary, forces);
             // Only boundary unknowns are read.
-            for (&dof, force) in self.schur.boundary(own).iter().zip(&self.forces[own]) {
-                torn[dof as usize] = self.scaling.flexibility[own][dof as usize] * force;
-            }
+            boundary.iter().zip(forces).for_each(|(&dof, x)| torn[dof as usize] = *x);
         }
         self.gather.apply(&self.torn, &mut self.rows);
         self.scaling.solve(&self.rows, y);
@@ -86,8 +86,7 @@ impl<'a> Preconditioner<'a> {
             for (entry, &place) in self.gather.entries(own).iter().zip(&self.places[own]) {
                 t[place as usize] += entry.value * self.rows[entry.row as usize];
             }
-            let flexibility = &self.scaling.flexibility[own];
-            t.iter_mut().zip(self.schur.boundary(own)).for_each(|(t, &dof)| *t *= flexibility[dof as usize]);
+            self.scaling.flexibility.apply(own, self.schur.boundary(own), t);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Stiffness scaling of the constraint rows: `B_D = (B D^-1 B')^-1 B D^-1` with `D` the diagonal of the stiffness.
+//! Stiffness scaling of the constraint rows: `B_D = (B D^-1 B')^-1 B D^-1` with `D^-1` the [`Flexibility`] of the stiffness.
 //!
 //! `B D^-1 B'` is block diagonal over the blocks of rows, so unequal stiffness on both sides of an interface, or of a
 //! contact, is weighted exactly (Rixen and Farhat 1999; Klawonn, Rheinbach 2007 in matrix form). Inverses of small blocks
@@ -6,20 +6,20 @@
 
 use std::ops::Range;
 
+use super::flexibility::Flexibility;
 use super::gather::Gather;
-use super::gram::{Gram, coefficients};
+use super::gram::{Coefficient, Gram, coefficients};
+use crate::assembly::pattern::Pattern;
 use crate::constraint::Constraints;
 
 /// Most rows of a small block.
 const SMALL: usize = 64;
 
-/// `D^-1` of own subdomains and the inverses of the blocks of `B D^-1 B'`.
+/// `D^-1` and the inverses of the blocks of `B D^-1 B'`.
 #[derive(Default)]
 pub struct Scaling {
-    /// Inverse diagonal of each own subdomain.
-    pub flexibility: Vec<Vec<f64>>,
-    /// The three components' flexibility at the node of each slot.
-    of_slot: Vec<[f64; 3]>,
+    /// `D^-1`.
+    pub flexibility: Flexibility,
     /// Rows of the small blocks.
     blocks: Vec<Range<usize>>,
     /// Inverses of the small blocks, row by row, one behind the other.
@@ -28,37 +28,26 @@ pub struct Scaling {
 }
 
 impl Scaling {
-    /// From the diagonals of the own subdomains' stiffness matrices, on all rows. One neighbour exchange.
-    pub fn new(constraints: &Constraints, gather: &Gather, diagonals: &[Vec<f64>]) -> Self {
-        let flexibility: Vec<Vec<f64>> = diagonals.iter().map(|d| d.iter().map(|x| 1.0 / x).collect()).collect();
-        // Every slot belongs to one node of its subdomain: three numbers tell the flexibility there.
-        let mut of_slot = vec![[0.0; 3]; constraints.slot_subdomain.len()];
-        gather.exchange(
-            3,
-            |own, slots| {
-                for entry in gather.entries(own) {
-                    let node = 3 * (entry.dof as usize / 3);
-                    slots[3 * entry.slot as usize..][..3].copy_from_slice(&flexibility[own][node..node + 3]);
-                }
-            },
-            |row, values| {
-                for (slot, three) in constraints.slots(row).zip(values.chunks_exact(3)) {
-                    of_slot[slot].copy_from_slice(three);
-                }
-            },
-        );
+    /// From patterns and lower values of the own subdomains' stiffness matrices, on all rows. Takes the neighbour exchanges of
+    /// [`Flexibility::new`].
+    pub fn new<'s>(
+        constraints: &Constraints,
+        gather: &Gather,
+        stiffness: impl Iterator<Item = (&'s Pattern, &'s [f64])>,
+    ) -> Self {
+        let flexibility = Flexibility::new(constraints, gather, stiffness);
         let (small, large): (Vec<_>, Vec<_>) = constraints.blocks.iter().cloned().partition(|rows| rows.len() <= SMALL);
         let mut inverses = Vec::new();
         for rows in &small {
-            inverses.extend(invert(block_matrix(constraints, rows.clone(), &of_slot, |_| true), rows.len()));
+            inverses.extend(invert(block_matrix(constraints, rows.clone(), &flexibility, |_| true), rows.len()));
         }
         let factor = |rows: Range<usize>| {
-            let mut gram = Gram::new(constraints, rows.collect());
-            gram.factorise(|slot, axis| of_slot[slot][axis], |_| true);
+            let mut gram = Gram::new(constraints, rows.collect(), true);
+            gram.factorise(|a, b| flexibility.between(a, b), |_| true);
             gram
         };
         let large = large.into_iter().map(factor).collect();
-        Self { flexibility, of_slot, blocks: small, inverses, large }
+        Self { flexibility, blocks: small, inverses, large }
     }
 
     /// From now on only the kept rows count, the others get zero. Only rows of inequalities may come and go. Local.
@@ -67,14 +56,14 @@ impl Scaling {
         for rows in &self.blocks {
             let end = at + rows.len() * rows.len();
             if constraints.rows[rows.clone()].iter().any(|row| row.is_inequality()) {
-                let block = block_matrix(constraints, rows.clone(), &self.of_slot, &kept);
+                let block = block_matrix(constraints, rows.clone(), &self.flexibility, &kept);
                 self.inverses[at..end].copy_from_slice(&invert(block, rows.len()));
             }
             at = end;
         }
-        // Only contact makes them large.
-        for gram in &mut self.large {
-            gram.factorise(|slot, axis| self.of_slot[slot][axis], &kept);
+        let changes = |gram: &&mut Gram| gram.rows().iter().any(|&row| constraints.rows[row].is_inequality());
+        for gram in self.large.iter_mut().filter(changes) {
+            gram.factorise(|a, b| self.flexibility.between(a, b), &kept);
         }
     }
 
@@ -96,18 +85,17 @@ impl Scaling {
 fn block_matrix(
     constraints: &Constraints,
     rows: Range<usize>,
-    of_slot: &[[f64; 3]],
+    flexibility: &Flexibility,
     kept: impl Fn(usize) -> bool,
 ) -> Vec<f64> {
     let n = rows.len();
     let kept = rows.clone().filter(|&row| kept(row)).map(|row| (row - rows.start, row));
-    let coefficients = coefficients(constraints, kept);
+    let coefficients = coefficients(constraints, kept, true);
     let mut matrix = vec![0.0; n * n];
-    for same in coefficients.chunk_by(|a, b| a.unknown() == b.unknown()) {
+    for same in coefficients.chunk_by(Coefficient::share_block) {
         for a in same {
             for b in same {
-                let flexibility = of_slot[a.slot][a.term.axis];
-                matrix[n * a.place + b.place] += a.term.value * b.term.value * flexibility;
+                matrix[n * a.place + b.place] += a.value * b.value * flexibility.between(a.site, b.site);
             }
         }
     }

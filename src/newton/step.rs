@@ -293,15 +293,11 @@ impl<'a> StepSolver<'a> {
             }
         }
         if let Some(preconditioner) = &mut self.preconditioner {
-            let diagonals: Vec<Vec<f64>> = self
-                .tangents
-                .values()
-                .iter()
-                .enumerate()
-                .map(|(own, values)| self.operator.factors.symbolic(own).pattern.diagonal(values))
-                .collect();
+            let factors = &self.operator.factors;
+            let values = self.tangents.values().iter().enumerate();
+            let stiffness = values.map(|(own, values)| (&factors.symbolic(own).pattern, &values[..]));
             preconditioner.scaling =
-                timer.time("scaling", || Scaling::new(problem.constraints, problem.gather, &diagonals));
+                timer.time("scaling", || Scaling::new(problem.constraints, problem.gather, stiffness));
         }
         Ok(problem.space.sum(&factorised, 1)[0] as usize)
     }

@@ -1,0 +1,191 @@
+//! Groups of nodes that short edges tie together.
+//!
+//! In flat or needle-like elements the ends of a short edge hardly move against each other. Where some of them are on a
+//! boundary, forces on one move all, and what is known of one alone (the diagonal of the stiffness) says nothing of how
+//! easily it gives way. So the scaling of the preconditioner takes them together, and their rows are in one block.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::comm::{Comm, all_gather_u64};
+use crate::decomposition::{Decomposition, Subdomain};
+use crate::mesh::Elements;
+
+/// An edge is short if the longest one of its element is more than so many times as long. (In a cube cut into tetrahedra it
+/// is 1.7 times.)
+const SHORT: f64 = 4.0;
+/// Larger groups are left alone: they would make larger problems than they save.
+const MOST: usize = 32;
+
+/// A group of an own subdomain.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Local nodes, ascending.
+    pub nodes: Vec<u32>,
+    /// Places among them of those on the interface.
+    pub on_interface: Vec<u32>,
+}
+
+/// The groups that have nodes on the interface.
+#[derive(Default)]
+pub struct Ties {
+    /// Groups of each own subdomain.
+    own: Vec<Vec<Group>>,
+    /// Nodes on the interface of each group of all subdomains, and which subdomain it is.
+    all: Vec<(u32, Vec<u64>)>,
+    /// Where a copy of a node is: the number of its group, and its place among those on the interface.
+    place: HashMap<(u32, u64), (u32, u32)>,
+}
+
+impl Ties {
+    /// Of all subdomains. Collective.
+    pub fn new(comm: &dyn Comm, decomposition: &Decomposition) -> Self {
+        let on_interface = |node| decomposition.interface.binary_search_by_key(&node, |n| n.node).is_ok();
+        let of_subdomain = |subdomain: &Subdomain| {
+            let local = |nodes: Vec<u32>| {
+                let there = (0..).zip(&nodes).filter(|(_, node)| on_interface(subdomain.nodes[**node as usize]));
+                Group { on_interface: there.map(|(place, _)| place).collect(), nodes }
+            };
+            let groups = groups(subdomain.nodes.len(), &subdomain.elements, &subdomain.shape).into_iter().map(local);
+            groups.filter(|group| !group.on_interface.is_empty()).collect()
+        };
+        let own: Vec<Vec<Group>> = decomposition.subdomains.iter().map(of_subdomain).collect();
+        let mut mine = Vec::new();
+        for (subdomain, groups) in decomposition.subdomains.iter().zip(&own) {
+            for group in groups {
+                mine.extend([subdomain.id as u64, group.on_interface.len() as u64]);
+                mine.extend(group.on_interface.iter().map(|&k| subdomain.nodes[group.nodes[k as usize] as usize]));
+            }
+        }
+        let mut numbers = all_gather_u64(comm, &mine).into_iter();
+        let mut all = Vec::new();
+        while let (Some(subdomain), Some(count)) = (numbers.next(), numbers.next()) {
+            all.push((subdomain as u32, numbers.by_ref().take(count as usize).collect::<Vec<u64>>()));
+        }
+        let mut place = HashMap::new();
+        for (number, (subdomain, nodes)) in (0..).zip(&all) {
+            (0..).zip(nodes).for_each(|(k, &node)| assert!(place.insert((*subdomain, node), (number, k)).is_none()));
+        }
+        Self { own, all, place }
+    }
+
+    /// Groups of an own subdomain.
+    pub fn of_own(&self, own: usize) -> &[Group] {
+        self.own.get(own).map_or(&[], Vec::as_slice)
+    }
+
+    /// Nodes on the interface of each group.
+    pub fn nodes(&self) -> impl Iterator<Item = &[u64]> {
+        self.all.iter().map(|(_, nodes)| nodes.as_slice())
+    }
+
+    /// Most nodes on the interface that a group has, on any rank; 0 if there are no groups.
+    pub fn widest(&self) -> usize {
+        self.nodes().map(<[u64]>::len).max().unwrap_or(0)
+    }
+
+    /// The number of the group of a copy of a node, and its place among those on the interface.
+    pub fn place(&self, subdomain: u32, node: u64) -> Option<(u32, u32)> {
+        self.place.get(&(subdomain, node)).copied()
+    }
+}
+
+/// Groups of two nodes and more, ascending, of elements on nodes at these points.
+fn groups(nodes: usize, elements: &Elements, points: &[[f64; 3]]) -> Vec<Vec<u32>> {
+    // Between the nodes of a quadratic element is half an edge.
+    let short = SHORT * elements.kind().degree() as f64;
+    let square = |a: u32, b: u32| -> f64 {
+        let (a, b) = (points[a as usize], points[b as usize]);
+        (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum()
+    };
+    let mut parent: Vec<u32> = (0..nodes as u32).collect();
+    let root = |parent: &mut [u32], mut node: u32| {
+        while parent[node as usize] != node {
+            parent[node as usize] = parent[parent[node as usize] as usize];
+            node = parent[node as usize];
+        }
+        node
+    };
+    for element in elements.iter() {
+        let pairs = || element.iter().enumerate().flat_map(|(k, &a)| element[..k].iter().map(move |&b| (a, b)));
+        let longest = pairs().map(|(a, b)| square(a, b)).fold(0.0, f64::max);
+        for (a, b) in pairs().filter(|&(a, b)| square(a, b) * short * short < longest) {
+            let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut groups: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for node in 0..nodes as u32 {
+        groups.entry(root(&mut parent, node)).or_default().push(node);
+    }
+    groups.into_values().filter(|group| (2..=MOST).contains(&group.len())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::Kind;
+    use crate::fixture::{RANKS, on_ranks, two_bricks};
+
+    /// Cells in a row along x, of unit length and width and this height.
+    fn row_of_cells(count: u32, height: f64) -> (Elements, Vec<[f64; 3]>) {
+        let at = |x: u32, y: u32, z: u32| 4 * x + 2 * y + z;
+        let cell = |x: u32| {
+            let base = |z| [at(x, 0, z), at(x + 1, 0, z), at(x + 1, 1, z), at(x, 1, z)];
+            [base(0), base(1)].concat()
+        };
+        let elements = Elements::new(Kind::Hex8, (0..count).flat_map(cell).collect());
+        let point = |n: u32| [f64::from(n / 4), f64::from(n / 2 % 2), height * f64::from(n % 2)];
+        (elements, (0..4 * (count + 1)).map(point).collect())
+    }
+
+    #[test]
+    fn ends_of_short_edges_are_a_group() {
+        let (elements, points) = row_of_cells(3, 0.1);
+        let found = groups(points.len(), &elements, &points);
+        assert_eq!(found, (0..8).map(|k| vec![2 * k, 2 * k + 1]).collect::<Vec<_>>());
+        let (elements, points) = row_of_cells(3, 0.5);
+        assert!(groups(points.len(), &elements, &points).is_empty());
+    }
+
+    #[test]
+    fn large_groups_are_left_alone() {
+        for (count, expected) in [(15, 2), (16, 0)] {
+            let (elements, mut points) = row_of_cells(count, 1.0);
+            // Needles along z: all corners below are a group, all above.
+            points.iter_mut().for_each(|point| (point[0], point[1]) = (1e-3 * point[0], 1e-3 * point[1]));
+            assert_eq!(groups(points.len(), &elements, &points).len(), expected, "{count}");
+        }
+    }
+
+    #[test]
+    fn all_ranks_know_all_groups_on_the_interface() {
+        let flat = ["body.upper.brick.size.2=0.2"];
+        for scene in [two_bricks(&flat), two_bricks(&["decomposition.subdomains=7", flat[0]])] {
+            let mut known = Vec::new();
+            for ranks in RANKS {
+                let found = on_ranks(&scene, ranks, |setup| {
+                    let ties = Ties::new(setup.comm, &setup.discrete.decomposition);
+                    let mut own = 0;
+                    for (k, subdomain) in setup.subdomains().iter().enumerate() {
+                        for group in ties.of_own(k) {
+                            let node = |k: &u32| subdomain.nodes[group.nodes[*k as usize] as usize];
+                            let (number, place) =
+                                ties.place(subdomain.id as u32, node(&group.on_interface[0])).unwrap();
+                            assert_eq!(place, 0);
+                            let nodes: Vec<u64> = group.on_interface.iter().map(node).collect();
+                            assert_eq!(ties.nodes().nth(number as usize), Some(&nodes[..]));
+                            assert_eq!(subdomain.body, 1, "the lower brick's cells are cubes");
+                            own += 1;
+                        }
+                    }
+                    (own, ties.nodes().map(<[u64]>::to_vec).collect::<Vec<_>>())
+                });
+                let all = &found[0].1;
+                assert!(!all.is_empty() && found.iter().all(|(_, other)| other == all));
+                assert_eq!(found.iter().map(|(own, _)| own).sum::<usize>(), all.len());
+                known.push(all.clone());
+            }
+            assert!(known.iter().all(|all| *all == known[0]), "whatever the ranks");
+        }
+    }
+}
