@@ -1,11 +1,14 @@
 //! `D^-1`: how easily the unknowns of each subdomain give way, the others held: the inverse of the stiffness' diagonal, or
 //! of its blocks for nodes that short edges tie together.
 
+use std::collections::HashMap;
+
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 
 use super::gather::Gather;
 use super::gram::Site;
+use super::preconditioner::boundaries;
 use crate::assembly::pattern::Pattern;
 use crate::constraint::ties::Group;
 use crate::constraint::{Constraints, Term};
@@ -18,13 +21,13 @@ const LOOSE: f64 = 1e10;
 pub struct Flexibility {
     /// Of each own subdomain's unknowns alone.
     alone: Vec<Vec<f64>>,
-    /// Of each own subdomain's groups.
-    tied: Vec<Vec<Tied>>,
+    /// Of each own subdomain's groups, on the unknowns that rows touch.
+    tied: Vec<Vec<Touched>>,
     /// The three components' at the node of each slot.
     of_slot: Vec<[f64; 3]>,
-    /// For slots of tied nodes, where their lines begin.
+    /// For slots of tied nodes, where the lines of their copy begin.
     line_of_slot: Vec<u32>,
-    /// Three lines a slot: what forces at all nodes of the group move there.
+    /// Three lines a copy: what forces at all nodes of its group move there.
     lines: Vec<f64>,
     /// Numbers in a line.
     width: usize,
@@ -47,18 +50,25 @@ impl Flexibility {
         stiffness: impl Iterator<Item = (&'s Pattern, &'s [f64])>,
     ) -> Self {
         let mut result = Self { width: 3 * constraints.ties.widest(), ..Self::default() };
+        let mut tied: Vec<Vec<Tied>> = Vec::new();
         for (own, (pattern, values)) in stiffness.enumerate() {
             let alone: Vec<f64> = pattern.diagonal(values).iter().map(|d| 1.0 / d).collect();
             let groups = constraints.ties.of_own(own).iter();
-            result.tied.push(groups.map(|group| Tied::new(group, pattern, values, &alone)).collect());
+            tied.push(groups.map(|group| Tied::new(group, pattern, values, &alone)).collect());
             result.alone.push(alone);
         }
-        result.exchange(constraints, gather);
+        result.exchange(constraints, gather, &tied);
+        let boundaries = boundaries(gather, tied.len()).into_iter();
+        let touched = |(tied, boundary): (Vec<Tied>, Vec<u32>)| {
+            let of_group = tied.iter().map(|group| group.touched(&boundary));
+            of_group.filter(|group| !group.places.is_empty()).collect()
+        };
+        result.tied = tied.into_iter().zip(boundaries).map(touched).collect();
         result
     }
 
     /// Brings to each slot what is its node's.
-    fn exchange(&mut self, constraints: &Constraints, gather: &Gather) {
+    fn exchange(&mut self, constraints: &Constraints, gather: &Gather, tied: &[Vec<Tied>]) {
         let slots = constraints.slot_subdomain.len();
         self.of_slot = vec![[0.0; 3]; slots];
         // Every slot belongs to one node of its subdomain: three numbers tell the flexibility there.
@@ -81,31 +91,27 @@ impl Flexibility {
             return;
         }
         self.line_of_slot = vec![u32::MAX; slots];
-        let mut count = 0;
+        let mut copies = HashMap::new();
         for (row, of_row) in constraints.rows.iter().enumerate() {
             for (slot, part) in constraints.slots(row).zip(of_row.terms.chunk_by(Term::share_slot)) {
-                if constraints.ties.place(part[0].subdomain, part[0].node).is_some() {
-                    self.line_of_slot[slot] = count;
-                    count += 3;
+                let copy = (part[0].subdomain, part[0].node);
+                if constraints.ties.place(copy.0, copy.1).is_some() {
+                    let next = 3 * copies.len() as u32;
+                    self.line_of_slot[slot] = *copies.entry(copy).or_insert(next);
                 }
             }
         }
-        self.lines = vec![0.0; count as usize * self.width];
-        let places: Vec<Vec<(u32, u32)>> = self.tied.iter().map(|groups| places(groups)).collect();
-        for column in 0..self.width {
-            let Self { tied, line_of_slot, lines, width, .. } = self;
+        self.lines = vec![0.0; 3 * copies.len() * self.width];
+        let sent: Vec<Vec<Sent>> = tied.iter().enumerate().map(|(own, tied)| Sent::all(gather, own, tied)).collect();
+        let Self { line_of_slot, lines, width, .. } = self;
+        for column in 0..*width {
             gather.exchange(
                 3,
                 |own, slots| {
-                    for entry in gather.entries(own) {
-                        let node = 3 * (entry.dof / 3);
-                        let Ok(at) = places[own].binary_search_by_key(&node, |(dof, _)| *dof) else { continue };
-                        let group = &tied[own][places[own][at].1 as usize];
+                    for &Sent { slot, group, line } in &sent[own] {
+                        let group = &tied[own][group];
                         if column < group.dofs.len() {
-                            let first = group.place(node).expect("it is in the group");
-                            for axis in 0..3 {
-                                slots[3 * entry.slot as usize + axis] = group.at(first + axis, column);
-                            }
+                            (0..3).for_each(|axis| slots[3 * slot + axis] = group.at(line + axis, column));
                         }
                     }
                 },
@@ -113,9 +119,7 @@ impl Flexibility {
                     for (slot, three) in constraints.slots(row).zip(values.chunks_exact(3)) {
                         let line = line_of_slot[slot];
                         if line != u32::MAX {
-                            for (line, value) in (line as usize..).zip(three) {
-                                lines[line * *width + column] = *value;
-                            }
+                            (line as usize..).zip(three).for_each(|(line, x)| lines[line * *width + column] = *x);
                         }
                     }
                 },
@@ -134,28 +138,42 @@ impl Flexibility {
         }
     }
 
-    /// `x = D^-1 x` on some unknowns of an own subdomain, ascending; zero elsewhere.
-    pub fn apply(&self, own: usize, dofs: &[u32], x: &mut [f64]) {
-        let forces: Vec<Vec<f64>> = self.tied[own].iter().map(|group| group.collect(dofs, x)).collect();
-        x.iter_mut().zip(dofs).for_each(|(x, &dof)| *x *= self.alone[own][dof as usize]);
-        for (group, forces) in self.tied[own].iter().zip(forces) {
-            for (line, &dof) in group.dofs.iter().enumerate() {
-                if let Ok(at) = dofs.binary_search(&dof) {
-                    x[at] = forces.iter().enumerate().map(|(column, force)| group.at(line, column) * force).sum();
-                }
+    /// `x = D^-1 x` on the unknowns of an own subdomain that rows touch: its `boundary`, ascending.
+    pub fn apply(&self, own: usize, boundary: &[u32], x: &mut [f64]) {
+        let forces: Vec<Vec<f64>> = self.tied[own].iter().map(|group| group.collect(x)).collect();
+        x.iter_mut().zip(boundary).for_each(|(x, &dof)| *x *= self.alone[own][dof as usize]);
+        for (Touched { places, values }, forces) in self.tied[own].iter().zip(forces) {
+            for (&place, line) in places.iter().zip(values.chunks_exact(places.len())) {
+                x[place as usize] = line.iter().zip(&forces).map(|(value, force)| value * force).sum();
             }
         }
     }
 }
 
-/// First unknown of each tied node and the number of its group, ascending.
-fn places(groups: &[Tied]) -> Vec<(u32, u32)> {
-    let of_group = |(number, group): (u32, &Tied)| -> Vec<(u32, u32)> {
-        group.dofs.iter().step_by(3).map(|&dof| (dof, number)).collect()
-    };
-    let mut places: Vec<(u32, u32)> = (0..).zip(groups).flat_map(of_group).collect();
-    places.sort_unstable();
-    places
+/// A slot of a tied node.
+struct Sent {
+    slot: usize,
+    /// Number of the group of its subdomain.
+    group: usize,
+    /// First line of the node in the group.
+    line: usize,
+}
+
+impl Sent {
+    /// All of an own subdomain.
+    fn all(gather: &Gather, own: usize, tied: &[Tied]) -> Vec<Self> {
+        let mut place = HashMap::new();
+        for (group, Tied { dofs, .. }) in tied.iter().enumerate() {
+            dofs.iter().enumerate().for_each(|(line, &dof)| assert!(place.insert(dof, (group, line)).is_none()));
+        }
+        let mut all = Vec::new();
+        for entry in gather.entries(own) {
+            if let Some(&(group, line)) = place.get(&(3 * (entry.dof / 3))) {
+                all.push(Self { slot: entry.slot as usize, group, line });
+            }
+        }
+        all
+    }
 }
 
 impl Tied {
@@ -180,12 +198,26 @@ impl Tied {
         self.values[line * self.dofs.len() + column]
     }
 
-    fn place(&self, dof: u32) -> Option<usize> {
-        self.dofs.binary_search(&dof).ok()
+    /// What is left of it where only the boundary, ascending, has forces.
+    fn touched(&self, boundary: &[u32]) -> Touched {
+        let lines: Vec<usize> =
+            (0..self.dofs.len()).filter(|&line| boundary.binary_search(&self.dofs[line]).is_ok()).collect();
+        let place = |&line: &usize| boundary.partition_point(|&dof| dof < self.dofs[line]) as u32;
+        let values = lines.iter().flat_map(|&line| lines.iter().map(move |&column| self.at(line, column))).collect();
+        Touched { places: lines.iter().map(place).collect(), values }
     }
+}
 
-    /// Of values at some unknowns, ascending, those at its own; zero where there are none.
-    fn collect(&self, dofs: &[u32], x: &[f64]) -> Vec<f64> {
-        self.dofs.iter().map(|dof| dofs.binary_search(dof).map_or(0.0, |at| x[at])).collect()
+/// The unknowns of a group that rows touch.
+struct Touched {
+    /// Their places on the boundary.
+    places: Vec<u32>,
+    /// `D^-1` among them, line by line.
+    values: Vec<f64>,
+}
+
+impl Touched {
+    fn collect(&self, x: &[f64]) -> Vec<f64> {
+        self.places.iter().map(|&place| x[place as usize]).collect()
     }
 }

@@ -7,7 +7,11 @@ use crate::constraint::{Constraints, Term};
 pub struct Gram {
     rows: Vec<usize>,
     column_begin: Vec<u32>,
+    /// Row and column of each entry of the lower triangle, column by column.
     row_index: Vec<u32>,
+    column_index: Vec<u32>,
+    /// Unknowns of all coefficients.
+    sites: Vec<Site>,
     products: Vec<Product>,
     analysis: Analysis,
     workspace: Workspace,
@@ -21,11 +25,12 @@ pub struct Gram {
 
 /// Product of two coefficients of one block of `W`.
 struct Product {
+    /// Where it belongs in the matrix.
     entry: u32,
-    rows: [u32; 2],
+    /// Numbers of the coefficients.
+    factors: [u32; 2],
     /// Twice where it stands for two, of two coefficients of one row.
     value: f64,
-    sites: [Site; 2],
 }
 
 /// Where a coefficient's unknown is.
@@ -98,32 +103,34 @@ pub fn coefficients(
 impl Gram {
     /// Of these rows, ascending; `tied` says that `W` has blocks.
     pub fn new(constraints: &Constraints, rows: Vec<usize>, tied: bool) -> Self {
-        let mut products = Vec::new();
         let coefficients = coefficients(constraints, rows.iter().copied().enumerate(), tied);
+        let mut products = Vec::new();
+        let mut places: Vec<[u32; 2]> = (0..rows.len() as u32).map(|k| [k, k]).collect();
+        let mut first = 0;
         for same in coefficients.chunk_by(Coefficient::share_block) {
             for (k, a) in same.iter().enumerate() {
-                products.extend(same[..=k].iter().enumerate().map(|(j, b)| Product {
-                    entry: 0,
-                    rows: [a.place as u32, b.place as u32],
-                    value: if j < k && a.place == b.place { 2.0 } else { 1.0 } * a.value * b.value,
-                    sites: [a.site, b.site],
-                }));
+                for (j, b) in same[..=k].iter().enumerate() {
+                    let times = if j < k && a.place == b.place { 2.0 } else { 1.0 };
+                    let factors = [first + k as u32, first + j as u32];
+                    products.push(Product { entry: 0, factors, value: times * a.value * b.value });
+                    places.push([b.place as u32, a.place as u32]);
+                }
             }
+            first += same.len() as u32;
         }
-        let mut places: Vec<[u32; 2]> = products.iter().map(|p| [p.rows[1], p.rows[0]]).collect();
-        places.extend((0..rows.len() as u32).map(|k| [k, k]));
         places.sort_unstable();
         places.dedup();
         for product in &mut products {
-            let [row, column] = product.rows;
+            let [row, column] = product.factors.map(|k| coefficients[k as usize].place as u32);
             product.entry = places.binary_search(&[column, row]).expect("every product has its place") as u32;
         }
         let column_begin: Vec<u32> =
             (0..=rows.len() as u32).map(|column| places.partition_point(|place| place[0] < column) as u32).collect();
-        let row_index: Vec<u32> = places.iter().map(|place| place[1]).collect();
+        let [column_index, row_index] = [0, 1].map(|k| places.iter().map(|place| place[k]).collect::<Vec<u32>>());
         let analysis = Analysis::minimum_degree(Lower { column_begin: &column_begin, rows: &row_index });
         Self {
             column_begin,
+            sites: coefficients.iter().map(|c| c.site).collect(),
             products,
             workspace: Workspace::new([&analysis]),
             factor: Factor::new(&analysis, Precision::Double),
@@ -133,8 +140,14 @@ impl Gram {
             values: vec![0.0; row_index.len()],
             unknowns: vec![0.0; rows.len()],
             row_index,
+            column_index,
             rows,
         }
+    }
+
+    /// Forgets what another [`Gram::factorise`] would need.
+    pub fn settle(&mut self) {
+        (self.sites, self.products) = Default::default();
     }
 
     /// The rows.
@@ -151,8 +164,14 @@ impl Gram {
     pub fn factorise(&mut self, weight: impl Fn(Site, Site) -> f64, kept: impl Fn(usize) -> bool) {
         self.kept.iter_mut().zip(&self.rows).for_each(|(k, &row)| *k = kept(row));
         self.values.fill(0.0);
-        for p in self.products.iter().filter(|p| p.rows.iter().all(|&row| self.kept[row as usize])) {
-            self.values[p.entry as usize] += p.value * weight(p.sites[0], p.sites[1]);
+        for Product { entry, factors, value } in &self.products {
+            let [a, b] = factors.map(|k| self.sites[k as usize]);
+            self.values[*entry as usize] += value * weight(a, b);
+        }
+        for ((value, &row), &column) in self.values.iter_mut().zip(&self.row_index).zip(&self.column_index) {
+            if !(self.kept[row as usize] && self.kept[column as usize]) {
+                *value = 0.0;
+            }
         }
         // The identity fills the place of the others: one analysis serves all sets.
         for (column, _) in self.kept.iter().enumerate().filter(|(_, kept)| !**kept) {
@@ -179,8 +198,8 @@ impl Gram {
 
     /// `y -= B B' x` on its rows, kept or not, where `W` has no blocks; `y` is by place.
     pub fn subtract_product(&self, x: &[f64], y: &mut [f64]) {
-        for Product { rows: [a, b], value, .. } in &self.products {
-            let (a, b) = (*a as usize, *b as usize);
+        for Product { entry, value, .. } in &self.products {
+            let [a, b] = [&self.row_index, &self.column_index].map(|index| index[*entry as usize] as usize);
             y[a] -= value * x[self.rows[b]];
             if a != b {
                 y[b] -= value * x[self.rows[a]];

@@ -42,8 +42,12 @@ impl Scaling {
             inverses.extend(invert(block_matrix(constraints, rows.clone(), &flexibility, |_| true), rows.len()));
         }
         let factor = |rows: Range<usize>| {
+            let changes = changes(constraints, rows.clone());
             let mut gram = Gram::new(constraints, rows.collect(), true);
             gram.factorise(|a, b| flexibility.between(a, b), |_| true);
+            if !changes {
+                gram.settle();
+            }
             gram
         };
         let large = large.into_iter().map(factor).collect();
@@ -55,15 +59,16 @@ impl Scaling {
         let mut at = 0;
         for rows in &self.blocks {
             let end = at + rows.len() * rows.len();
-            if constraints.rows[rows.clone()].iter().any(|row| row.is_inequality()) {
+            if changes(constraints, rows.clone()) {
                 let block = block_matrix(constraints, rows.clone(), &self.flexibility, &kept);
                 self.inverses[at..end].copy_from_slice(&invert(block, rows.len()));
             }
             at = end;
         }
-        let changes = |gram: &&mut Gram| gram.rows().iter().any(|&row| constraints.rows[row].is_inequality());
-        for gram in self.large.iter_mut().filter(changes) {
-            gram.factorise(|a, b| self.flexibility.between(a, b), &kept);
+        for gram in &mut self.large {
+            if changes(constraints, gram.rows()[0]..gram.rows()[gram.rows().len() - 1] + 1) {
+                gram.factorise(|a, b| self.flexibility.between(a, b), &kept);
+            }
         }
     }
 
@@ -79,6 +84,11 @@ impl Scaling {
         }
         self.large.iter_mut().for_each(|gram| gram.solve(x, y));
     }
+}
+
+/// Whether rows of a block may come and go.
+fn changes(constraints: &Constraints, rows: Range<usize>) -> bool {
+    constraints.rows[rows].iter().any(|row| row.is_inequality())
 }
 
 /// `B D^-1 B'` of one block, zero in the rows that are not kept.
