@@ -33,14 +33,6 @@ pub struct Flexibility {
     width: usize,
 }
 
-/// A group of an own subdomain.
-struct Tied {
-    /// Unknowns of its nodes on the interface.
-    dofs: Vec<u32>,
-    /// `D^-1` among them, line by line.
-    values: Vec<f64>,
-}
-
 impl Flexibility {
     /// From patterns and lower values of the own subdomains' stiffness matrices. `1 + 3 n` neighbour exchanges where groups
     /// have up to `n` nodes on the interface.
@@ -58,12 +50,15 @@ impl Flexibility {
             result.alone.push(alone);
         }
         result.exchange(constraints, gather, &tied);
-        let boundaries = boundaries(gather, tied.len()).into_iter();
-        let touched = |(tied, boundary): (Vec<Tied>, Vec<u32>)| {
-            let of_group = tied.iter().map(|group| group.touched(&boundary));
-            of_group.filter(|group| !group.places.is_empty()).collect()
+        result.tied = if result.width == 0 {
+            tied.iter().map(|_| Vec::new()).collect()
+        } else {
+            let touched = |(tied, boundary): (&Vec<Tied>, Vec<u32>)| {
+                let of_group = tied.iter().map(|group| group.touched(&boundary));
+                of_group.filter(|group| !group.places.is_empty()).collect()
+            };
+            tied.iter().zip(boundaries(gather, tied.len())).map(touched).collect()
         };
-        result.tied = tied.into_iter().zip(boundaries).map(touched).collect();
         result
     }
 
@@ -174,6 +169,14 @@ impl Sent {
         }
         all
     }
+}
+
+/// A group of an own subdomain.
+struct Tied {
+    /// Unknowns of its nodes on the interface.
+    dofs: Vec<u32>,
+    /// `D^-1` among them, line by line.
+    values: Vec<f64>,
 }
 
 impl Tied {
