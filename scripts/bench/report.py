@@ -61,6 +61,13 @@ once does eight times the work on what it reads, so `dual operator` and `precond
 
 """
 
+NEXT_HALF = """What the next factor of two would take: {half} s of {total} s must go. F and the preconditioner take {apply} s, {least_apply} s with
+all they read at the limit; factors take {factorise} s, {least_factorise} s at the limit; everything else takes {rest} s. At both limits
+the run would still take {least} s, so faster kernels alone do not halve it. It takes less work as well: fewer bytes (factors in half
+precision), fewer applications (directions that outlive a Newton step), fewer factors (those that differ from the last in a few
+elements only, corrected), and half of everything else.
+"""
+
 
 class Group:
     """The repetitions of one kind of run, made by one commit: the one that was measured last."""
@@ -363,7 +370,26 @@ def profile(levels):
     coarser = ", coarser levels included" if summary["cascade"] else ""
     imbalance = summary["imbalance"] or 1.0
     text = PROFILE.format(variant=variant, level=level, ranks=ranks, coarser=coarser, imbalance=imbalance)
-    return text + table(["phase", "seconds", "share", "rate, all ranks"], rows)
+    return text + table(["phase", "seconds", "share", "rate, all ranks"], rows) + "\n" + next_half(summary, flops, read)
+
+
+def next_half(summary, flops, read):
+    """What would halve the time of a run, against limits of work in GF/s and GB/s."""
+    applying, factorising = ("dual operator", "preconditioner"), ("factorisation", "factorisation of the interior")
+
+    def taken(names):
+        return sum(summary["time"].get(name, 0) for name in names)
+
+    def least(names):
+        work = [summary.get("work", {}).get(name, {}) for name in names]
+        return sum(max(w.get("flops", 0) / flops, w.get("bytes", 0) / read) / 1e9 for w in work)
+
+    total, apply, factorise = summary["time_total"], taken(applying), taken(factorising)
+    rest = total - apply - factorise
+    numbers = {"total": total, "half": total / 2, "apply": apply, "factorise": factorise, "rest": rest}
+    numbers |= {"least_apply": least(applying), "least_factorise": least(factorising)}
+    numbers["least"] = rest + numbers["least_apply"] + numbers["least_factorise"]
+    return NEXT_HALF.format(**{name: f"{value:.3g}" for name, value in numbers.items()})
 
 
 def table_1(groups, study, paper):
