@@ -19,9 +19,8 @@ const FLAT: &str = "body.upper.brick.size.2=0.2";
 
 fn scenes() -> [Scene; 6] {
     let small = two_bricks(&["decomposition.cells=[1, 2, 2]"]);
-    let flat = [two_bricks(&[FLAT]), not_matching(&[FLAT])];
-    let [one, other] = flat;
-    [two_bricks(&[]), two_bricks_by_metis(7), small, not_matching(&[]), one, other]
+    let (flat, flat_mortar) = (two_bricks(&[FLAT]), not_matching(&[FLAT]));
+    [two_bricks(&[]), two_bricks_by_metis(7), small, not_matching(&[]), flat, flat_mortar]
 }
 
 /// A preconditioner at the elastic stiffness, and what it stands on.
