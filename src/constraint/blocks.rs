@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+use super::components::Components;
 use super::contact::Side;
 use super::ties::Ties;
 use super::{ConstraintError, Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, gluing};
@@ -10,7 +11,6 @@ use crate::contact::ContactPair;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
 /// Nodes tied together by contact and short edges, and the contact pairs among them.
-#[derive(Default)]
 struct Cluster {
     nodes: BTreeSet<u64>,
     pairs: Vec<usize>,
@@ -133,34 +133,21 @@ fn gather_nodes(
 
 /// Connected components of the nodes under the contact pairs and the ties, named by their lowest node.
 fn clusters(pairs: &[ContactPair], ties: &Ties) -> (HashMap<u64, u64>, BTreeMap<u64, Cluster>) {
-    let mut parent: HashMap<u64, u64> = HashMap::new();
-    fn root(parent: &mut HashMap<u64, u64>, mut node: u64) -> u64 {
-        loop {
-            let up = *parent.entry(node).or_insert(node);
-            if up == node {
-                return node;
-            }
-            // Halves the way for the next search.
-            let further = parent[&up];
-            parent.insert(node, further);
-            node = further;
-        }
+    let mut components = Components::default();
+    for pair in pairs {
+        nodes_of(pair).for_each(|node| components.join(pair.slave, node));
     }
-    let of_pairs = pairs.iter().flat_map(|pair| nodes_of(pair).map(|node| (pair.slave, node)));
-    let of_ties = ties.nodes().flat_map(|nodes| nodes.iter().map(|&node| (nodes[0], node)));
-    for (one, other) in of_pairs.chain(of_ties) {
-        let (a, b) = (root(&mut parent, one), root(&mut parent, other));
-        parent.insert(a.max(b), a.min(b));
+    for nodes in ties.nodes() {
+        nodes.iter().for_each(|&node| components.join(nodes[0], node));
     }
-    let mut clusters: BTreeMap<u64, Cluster> = BTreeMap::new();
     let mut names = HashMap::new();
-    for node in parent.keys().copied().collect::<Vec<_>>() {
-        let name = root(&mut parent, node);
-        names.insert(node, name);
-        clusters.entry(name).or_default().nodes.insert(node);
+    let mut clusters: BTreeMap<u64, Cluster> = BTreeMap::new();
+    for (name, nodes) in components.members() {
+        names.extend(nodes.iter().map(|&node| (node, name)));
+        clusters.insert(name, Cluster { nodes, pairs: Vec::new() });
     }
     for (number, pair) in pairs.iter().enumerate() {
-        clusters.entry(names[&pair.slave]).or_default().pairs.push(number);
+        clusters.get_mut(&names[&pair.slave]).expect("every name has its cluster").pairs.push(number);
     }
     (names, clusters)
 }

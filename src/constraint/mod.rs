@@ -7,14 +7,15 @@
 //! stiff ones first, so that stiff ones are not glued by way of a soft one.
 //!
 //! Rows that share a node form a *block*: the gluing and support rows of a node, together with those of the nodes
-//! that contact, or short edges ([`ties`]), tie to it. A rank holds every row of every block that one of its subdomains touches, so whatever
-//! couples the rows of a block is local. Rows, their order and their coefficients do not depend on the ranks.
+//! that contact, or short edges ([`ties`]), tie to it. A rank holds every row of every block that one of its
+//! subdomains touches, so whatever couples the rows of a block is local. Rows, their order and their coefficients do not depend on the ranks.
 //!
 //! Supports and contact act on the mean over the copies and are therefore orthogonal to gluing (design: "Constraint
 //! rows"). The counts are those of the paper's Table 2: gluing `copies - 1` a component, one support row a node and
 //! component, one contact row a slave node and contact.
 
 pub mod blocks;
+pub mod components;
 pub mod contact;
 pub mod dirichlet;
 pub mod gluing;

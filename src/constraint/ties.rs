@@ -4,8 +4,9 @@
 //! boundary, forces on one move all, and what is known of one alone (the diagonal of the stiffness) says nothing of how
 //! easily it gives way. So the scaling of the preconditioner takes them together, and their rows are in one block.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
+use super::components::Components;
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::{Decomposition, Subdomain};
 use crate::mesh::Elements;
@@ -26,7 +27,6 @@ pub struct Group {
 }
 
 /// The groups that have nodes on the interface.
-#[derive(Default)]
 pub struct Ties {
     /// Groups of each own subdomain.
     own: Vec<Vec<Group>>,
@@ -45,7 +45,7 @@ impl Ties {
                 let there = (0..).zip(&nodes).filter(|(_, node)| on_interface(subdomain.nodes[**node as usize]));
                 Group { on_interface: there.map(|(place, _)| place).collect(), nodes }
             };
-            let groups = groups(subdomain.nodes.len(), &subdomain.elements, &subdomain.shape).into_iter().map(local);
+            let groups = groups(&subdomain.elements, &subdomain.shape).into_iter().map(local);
             groups.filter(|group| !group.on_interface.is_empty()).collect()
         };
         let own: Vec<Vec<Group>> = decomposition.subdomains.iter().map(of_subdomain).collect();
@@ -70,7 +70,7 @@ impl Ties {
 
     /// Groups of an own subdomain.
     pub fn of_own(&self, own: usize) -> &[Group] {
-        self.own.get(own).map_or(&[], Vec::as_slice)
+        &self.own[own]
     }
 
     /// Nodes on the interface of each group.
@@ -89,35 +89,24 @@ impl Ties {
     }
 }
 
-/// Groups of two nodes and more, ascending, of elements on nodes at these points.
-fn groups(nodes: usize, elements: &Elements, points: &[[f64; 3]]) -> Vec<Vec<u32>> {
+/// Groups of nodes, ascending, of elements on nodes at these points.
+fn groups(elements: &Elements, points: &[[f64; 3]]) -> Vec<Vec<u32>> {
     // Between the nodes of a quadratic element is half an edge.
     let short = SHORT * elements.kind().degree() as f64;
     let square = |a: u32, b: u32| -> f64 {
         let (a, b) = (points[a as usize], points[b as usize]);
         (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum()
     };
-    let mut parent: Vec<u32> = (0..nodes as u32).collect();
-    let root = |parent: &mut [u32], mut node: u32| {
-        while parent[node as usize] != node {
-            parent[node as usize] = parent[parent[node as usize] as usize];
-            node = parent[node as usize];
-        }
-        node
-    };
+    let mut components = Components::default();
     for element in elements.iter() {
         let pairs = || element.iter().enumerate().flat_map(|(k, &a)| element[..k].iter().map(move |&b| (a, b)));
         let longest = pairs().map(|(a, b)| square(a, b)).fold(0.0, f64::max);
         for (a, b) in pairs().filter(|&(a, b)| square(a, b) * short * short < longest) {
-            let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-            parent[a.max(b) as usize] = a.min(b);
+            components.join(a.into(), b.into());
         }
     }
-    let mut groups: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for node in 0..nodes as u32 {
-        groups.entry(root(&mut parent, node)).or_default().push(node);
-    }
-    groups.into_values().filter(|group| (2..=MOST).contains(&group.len())).collect()
+    let groups = components.members().into_values().map(|nodes| nodes.into_iter().map(|node| node as u32).collect());
+    groups.filter(|group: &Vec<u32>| group.len() <= MOST).collect()
 }
 
 #[cfg(test)]
@@ -141,10 +130,10 @@ mod tests {
     #[test]
     fn ends_of_short_edges_are_a_group() {
         let (elements, points) = row_of_cells(3, 0.1);
-        let found = groups(points.len(), &elements, &points);
+        let found = groups(&elements, &points);
         assert_eq!(found, (0..8).map(|k| vec![2 * k, 2 * k + 1]).collect::<Vec<_>>());
         let (elements, points) = row_of_cells(3, 0.5);
-        assert!(groups(points.len(), &elements, &points).is_empty());
+        assert!(groups(&elements, &points).is_empty());
     }
 
     #[test]
@@ -153,7 +142,7 @@ mod tests {
             let (elements, mut points) = row_of_cells(count, 1.0);
             // Needles along z: all corners below are a group, all above.
             points.iter_mut().for_each(|point| (point[0], point[1]) = (1e-3 * point[0], 1e-3 * point[1]));
-            assert_eq!(groups(points.len(), &elements, &points).len(), expected, "{count}");
+            assert_eq!(groups(&elements, &points).len(), expected, "{count}");
         }
     }
 
