@@ -31,6 +31,7 @@ use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::coupling::Coupling;
+use crate::feti::deluxe::Deluxe;
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::gather::Gather;
 use crate::feti::hybrid::Hybrid;
@@ -40,6 +41,7 @@ use crate::feti::preconditioner::{self, Preconditioner};
 use crate::feti::projector::Projector;
 use crate::feti::schur::Schur;
 use crate::feti::space::RowSpace;
+use crate::feti::supported;
 use crate::material::History;
 use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
@@ -199,11 +201,15 @@ pub fn solve_from(
         let alike = alike(comm, subdomains, &boundaries);
         timer.time("symbolic analysis", || Schur::new(&symbolic, boundaries, &alike, precision))
     };
-    let preconditioner = match scene.solver.preconditioner {
+    let schur = match scene.solver.preconditioner {
         scene::Preconditioner::None => None,
-        scene::Preconditioner::Lumped => Some(Preconditioner::new(&gather, schur(None))),
-        scene::Preconditioner::Dirichlet => Some(Preconditioner::new(&gather, schur(Some(precision)))),
+        scene::Preconditioner::Lumped => Some(schur(None)),
+        scene::Preconditioner::Dirichlet => Some(schur(Some(precision))),
     };
+    let preconditioner = schur.map(|schur| {
+        let deluxe = Deluxe::new(comm, shares, constraints, &gather, &schur);
+        Preconditioner::new(&gather, schur, deluxe)
+    });
     let (loading::Conditions { loads, rhs }, stages) = conditions::stages(scene, discrete, &|| gather.zeros());
     let mut problem = TornProblem {
         subdomains,
@@ -241,7 +247,9 @@ pub fn solve_from(
     let hybrid = (!clusters.are_single())
         .then(|| timer.time("clusters", || Hybrid::new(clusters.of_rank(comm.rank()), subdomains)));
     let operator = DualOperator::new(Factors::new(symbolic, precision), hybrid, &gather);
-    let mut steps = StepSolver::new(operator, Projector { coarse }, preconditioner, programs, twins(comm, subdomains));
+    let supported = supported::unknowns(constraints, &gather, subdomains, &modes);
+    let projector = Projector { coarse };
+    let mut steps = StepSolver::new(operator, projector, preconditioner, programs, twins(comm, subdomains), supported);
     let report = RefCell::new(report);
     let alive = |step, applications| {
         report.borrow_mut()(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });

@@ -119,6 +119,20 @@ impl Pattern {
         rows.binary_search(&row).map_or(0.0, |at| values[begin + at])
     }
 
+    /// Sets to zero what couples some unknowns, ascending, to each other and to the rest.
+    pub fn uncouple(&self, unknowns: &[u32], values: &mut [f64]) {
+        let is_one = |dof: u32| unknowns.binary_search(&dof).is_ok();
+        for column in 0..self.dofs() as u32 {
+            let range = self.column_begin[column as usize] as usize..self.column_begin[column as usize + 1] as usize;
+            let all = is_one(column);
+            for (&row, value) in self.rows[range.clone()].iter().zip(&mut values[range]) {
+                if row != column && (all || is_one(row)) {
+                    *value = 0.0;
+                }
+            }
+        }
+    }
+
     /// The diagonal of the matrix with these values.
     pub fn diagonal(&self, values: &[f64]) -> Vec<f64> {
         (0..self.dofs()).map(|c| values[self.column_begin[c] as usize]).collect()

@@ -12,7 +12,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::traits::RealField;
-use faer::{Par, Side, Spec};
+use faer::{Mat, Par, Side, Spec};
 
 use super::supernodes;
 pub use super::supernodes::WIDTH;
@@ -77,6 +77,13 @@ impl Factor {
         }
     }
 
+    fn number(&self, at: usize) -> f64 {
+        match self {
+            Self::Single(numbers) => f64::from(numbers[at]),
+            Self::Double(numbers) => numbers[at],
+        }
+    }
+
     /// Size of its numbers, in bytes. A solve reads them twice.
     pub fn bytes(&self) -> usize {
         match self {
@@ -122,6 +129,51 @@ impl Analysis {
         self.0.len_val()
     }
 
+    /// The least pivot of a factor, relative to what `diagonal` tells of its unknown.
+    pub fn least_pivot(&self, factor: &Factor, diagonal: impl Fn(usize) -> f64) -> f64 {
+        let pivots = self.columns().map(|column| {
+            let pivot = factor.number(column.at);
+            pivot * pivot / diagonal(column.unknown)
+        });
+        pivots.fold(f64::INFINITY, f64::min)
+    }
+
+    /// `A_ff - A_fr A_rr^-1 A_rf` with f the last `count` unknowns in the order of elimination and r the others: `place` tells the
+    /// line of an unknown of f.
+    pub fn complement(&self, factor: &Factor, count: usize, place: impl Fn(usize) -> Option<usize>) -> Mat<f64> {
+        let mut lower = Mat::zeros(count, count);
+        for column in self.columns() {
+            let Some(k) = place(column.unknown) else { continue };
+            for (row, at) in column.rows.zip(column.at..) {
+                let i = place(row).expect("what is eliminated later is among the last");
+                lower[(i, k)] = factor.number(at);
+            }
+        }
+        &lower * lower.transpose()
+    }
+
+    /// The columns of a factor.
+    fn columns(&self) -> impl Iterator<Item = Column<impl Iterator<Item = usize>>> {
+        let order = self.0.perm().map_or(&[][..], |order| order.arrays().0);
+        let panels = match self.0.raw() {
+            SymbolicCholeskyRaw::Supernodal(panels) => Some(panels),
+            // Only a matrix without unknowns.
+            SymbolicCholeskyRaw::Simplicial(_) => None,
+        };
+        panels.into_iter().flat_map(move |panels| {
+            (0..panels.n_supernodes()).flat_map(move |s| {
+                let (begin, end) = (panels.supernode_begin()[s] as usize, panels.supernode_end()[s] as usize);
+                let below = panels.supernode(s).pattern();
+                let (first, height) = (panels.col_ptr_for_val()[s] as usize, end - begin + below.len());
+                (begin..end).map(move |place| {
+                    let rows = (place..end).chain(below.iter().map(|&row| row as usize));
+                    let rows = rows.map(move |row| order[row] as usize);
+                    Column { unknown: order[place] as usize, at: first + (place - begin) * (height + 1), rows }
+                })
+            })
+        })
+    }
+
     /// Additions and multiplications of a factorisation.
     pub fn flops(&self) -> f64 {
         let SymbolicCholeskyRaw::Supernodal(panels) = self.0.raw() else { return 0.0 };
@@ -131,6 +183,15 @@ impl Analysis {
         };
         (0..panels.n_supernodes()).flat_map(|s| (0..).map_while(move |column| rows(s, column))).map(|n| n * n).sum()
     }
+}
+
+/// One column of a factor.
+struct Column<R> {
+    unknown: usize,
+    /// Where its pivot stands among the numbers; the others follow.
+    at: usize,
+    /// The unknowns of its numbers, its own first.
+    rows: R,
 }
 
 /// Scratch memory for some analyses.
@@ -312,6 +373,29 @@ mod tests {
             let outcome = Workspace::new([&analysis]).factorise(&analysis, lower, &values, &mut factor);
             let breakdown = outcome.expect_err("the diagonal is negative");
             assert_eq!(breakdown.unknown, 4);
+        }
+    }
+
+    #[test]
+    fn pivots_and_complements_of_a_chain() {
+        let (column_begin, rows, values) = chain(6, 1.0);
+        let lower = Lower { column_begin: &column_begin, rows: &rows };
+        // The ends meet at the third, then at the fourth unknown.
+        let analysis = Analysis::ordered(lower, &[0, 1, 5, 4, 3, 2]);
+        for precision in [Precision::Single, Precision::Double] {
+            let mut factor = Factor::new(&analysis, precision);
+            Workspace::new([&analysis]).factorise(&analysis, lower, &values, &mut factor).expect("definite");
+            // The pivots of either half are 3, 3 - 1/3, ..., as of the continued fraction.
+            let (second, fourth) = (3.0 - 1.0 / 3.0, 3.0 - 1.0 / (3.0 - 1.0 / 3.0));
+            let third = 3.0 - 1.0 / second - 1.0 / fourth;
+            assert!((analysis.least_pivot(&factor, |_| 3.0) - third / 3.0).abs() < 1e-6);
+            let found = analysis.complement(&factor, 2, |unknown| [2, 3].iter().position(|&k| k == unknown));
+            let expected = [[3.0 - 1.0 / second, -1.0], [-1.0, fourth]];
+            for (i, line) in expected.iter().enumerate() {
+                for (j, value) in line.iter().enumerate() {
+                    assert!((found[(i, j)] - value).abs() < 1e-6, "{found:?}");
+                }
+            }
         }
     }
 }

@@ -95,6 +95,8 @@ pub struct Factors {
     /// What tells factors apart: equal numbers, equal factors.
     stamps: Vec<u64>,
     made: u64,
+    /// Unknowns of each own subdomain that are kept at zero.
+    held: Vec<Vec<u32>>,
 }
 
 impl Factors {
@@ -102,8 +104,8 @@ impl Factors {
     pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
         let factors = Stock::new(symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)));
-        let stamps = vec![0; symbolic.len()];
-        Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0 }
+        let (stamps, held) = (vec![0; symbolic.len()], vec![Vec::new(); symbolic.len()]);
+        Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0, held }
     }
 
     /// Symbolic analysis of an own subdomain.
@@ -133,13 +135,55 @@ impl Factors {
         stiffness: &[f64],
         common: bool,
     ) -> Result<(), NotDefinite> {
+        self.take(own, subdomain, stiffness, Vec::new(), common)
+    }
+
+    /// As [`Factors::factorise`], with these unknowns kept at zero, which leave no rigid motion: in place of `K + rho Q`, the rest
+    /// of `K`. See [`super::supported`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn hold(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        stiffness: &[f64],
+        held: &[u32],
+    ) -> Result<(), NotDefinite> {
+        self.take(own, subdomain, stiffness, held.to_vec(), false)
+    }
+
+    /// The least pivot of the factor of an own subdomain, relative to the diagonal entry of its `stiffness` there.
+    pub fn least_pivot(&self, own: usize, stiffness: &[f64]) -> f64 {
+        let Symbolic { pattern, cholesky, .. } = &*self.symbolic[own];
+        cholesky.least_pivot(self.factors.of(own), |dof| stiffness[pattern.column_begin[dof] as usize])
+    }
+
+    /// Unknowns of an own subdomain that are kept at zero, ascending.
+    pub fn held(&self, own: usize) -> &[u32] {
+        &self.held[own]
+    }
+
+    fn take(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        stiffness: &[f64],
+        held: Vec<u32>,
+        common: bool,
+    ) -> Result<(), NotDefinite> {
         let Symbolic { pattern, fixing, cholesky, .. } = &*self.symbolic[own];
         let n = pattern.dofs();
         self.shifted.clear();
         self.shifted.extend_from_slice(stiffness);
         let diagonal = pattern.diagonal(stiffness);
         let rho = diagonal.iter().sum::<f64>() / n as f64;
-        add_fixing(pattern, fixing, &subdomain.shape, rho, &mut self.shifted);
+        if held.is_empty() {
+            add_fixing(pattern, fixing, &subdomain.shape, rho, &mut self.shifted);
+        } else {
+            pattern.uncouple(&held, &mut self.shifted);
+        }
+        self.held[own] = held;
         let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
         if !rho.is_finite() {
             return Err(refuse(0));
@@ -165,6 +209,7 @@ impl Factors {
     /// From now on an own subdomain has the factor of a congruent one with equal stiffness.
     pub fn share(&mut self, own: usize, twin: usize) {
         self.factors.share(own, twin, true);
+        self.held[own].clear();
         self.stamps[own] = self.stamps[twin];
     }
 
@@ -200,6 +245,7 @@ impl Factors {
         for batch in self.factors.batches() {
             match batch {
                 &Batch::Alone(own) => {
+                    self.held[own].iter().for_each(|&dof| x[own][dof as usize] = 0.0);
                     self.workspace.solve(&self.symbolic[own].cholesky, self.factors.of(own), &mut x[own]);
                 }
                 Batch::Twins(twins) => {

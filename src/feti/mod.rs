@@ -8,6 +8,7 @@ pub mod bodies;
 pub mod cholesky;
 pub mod coarse;
 pub mod coupling;
+pub mod deluxe;
 pub mod face;
 pub mod factor;
 pub mod flexibility;
@@ -23,7 +24,9 @@ pub mod scaling;
 pub mod schur;
 pub mod space;
 pub mod stock;
+pub mod submatrix;
 mod supernodes;
+pub mod supported;
 
 /// A torn vector: for each own subdomain its local unknowns.
 pub type Torn = Vec<Vec<f64>>;

@@ -2,6 +2,7 @@
 //! complement (Dirichlet); Farhat, Mandel and Roux 1994, with the stiffness scaling of [`super::scaling`].
 
 use super::Torn;
+use super::deluxe::Deluxe;
 use super::gather::Gather;
 use super::scaling::Scaling;
 use super::schur::Schur;
@@ -13,11 +14,15 @@ pub struct Preconditioner<'a> {
     pub schur: Schur,
     /// Scaling of the rows; set by the caller before the first application, and when tangents or rows change.
     pub scaling: Scaling,
+    /// Scaling of faces beside weak subdomains; updated by the caller when tangents change.
+    pub deluxe: Deluxe<'a>,
     /// Place among the boundary unknowns of each own subdomain's coefficients, in the order of the rows.
     places: Vec<Vec<u32>>,
     displacements: Vec<Vec<f64>>,
     forces: Vec<Vec<f64>>,
     torn: Torn,
+    /// What faces with a scaling of their own make of forces.
+    parts: Torn,
     rows: Vec<f64>,
     applications: usize,
 }
@@ -36,7 +41,7 @@ pub fn boundaries(gather: &Gather, own: usize) -> Vec<Vec<u32>> {
 
 impl<'a> Preconditioner<'a> {
     /// With the boundary stiffness on the [`boundaries`] of the same `gather`.
-    pub fn new(gather: &'a Gather<'a>, schur: Schur) -> Self {
+    pub fn new(gather: &'a Gather<'a>, schur: Schur, deluxe: Deluxe<'a>) -> Self {
         let torn = gather.zeros();
         let place = |own: usize, dof| schur.boundary(own).binary_search(&dof).expect("rows touch boundary unknowns");
         let places = (0..torn.len())
@@ -47,20 +52,25 @@ impl<'a> Preconditioner<'a> {
             gather,
             schur,
             scaling: Scaling::default(),
+            deluxe,
             places,
             forces: displacements.clone(),
             displacements,
+            parts: torn.clone(),
             torn,
             rows: vec![0.0; gather.rows()],
             applications: 0,
         }
     }
 
-    /// `y = B_D S B_D' x`. One neighbour exchange.
+    /// `y = B_D S B_D' x`. One neighbour exchange, or two where faces have a scaling of their own.
     pub fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.applications += 1;
         self.displace(x);
         self.schur.apply(&self.displacements, &mut self.forces);
+        if self.deluxe.is_active() {
+            self.deluxe.collect(&mut self.forces, &mut self.parts);
+        }
         for (own, torn) in self.torn.iter_mut().enumerate() {
             let (boundary, forces) = (self.schur.boundary(own), &mut self.forces[own]);
             self.scaling.flexibility.apply(own, boundary, forces);
@@ -69,6 +79,10 @@ impl<'a> Preconditioner<'a> {
         }
         self.gather.apply(&self.torn, &mut self.rows);
         self.scaling.solve(&self.rows, y);
+        if self.deluxe.is_active() {
+            self.gather.apply(&self.parts, &mut self.rows);
+            y.iter_mut().zip(&self.rows).for_each(|(y, part)| *y += part);
+        }
     }
 
     /// Adds to a torn displacement what closes the rows' `defect = c - B u`: `B_D' defect` on the boundary and, for
@@ -88,6 +102,7 @@ impl<'a> Preconditioner<'a> {
             }
             self.scaling.flexibility.apply(own, self.schur.boundary(own), t);
         }
+        self.deluxe.share(x, &mut self.displacements);
     }
 
     /// Applications so far.

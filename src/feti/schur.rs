@@ -7,44 +7,11 @@
 use std::rc::Rc;
 
 use super::Torn;
-use super::cholesky::{Analysis, Factor, Lower, Precision, WIDTH, Workspace};
+use super::cholesky::{Factor, Precision, WIDTH, Workspace};
 use super::factor::{NotDefinite, Symbolic};
 use super::stock::{Batch, Stock};
+use super::submatrix::{Entries, Submatrix};
 use crate::simd::vectorised;
-
-/// Entries of one block of the stiffness matrix, line by line.
-#[derive(Default)]
-struct Entries {
-    begin: Vec<u32>,
-    /// The other index of each entry, in the numbering of its kind.
-    others: Vec<u32>,
-    /// Where each entry stands among the values of the whole matrix.
-    positions: Vec<u32>,
-}
-
-impl Entries {
-    /// From lists of (other index, position).
-    fn new(lines: impl IntoIterator<Item = Vec<(u32, u32)>>) -> Self {
-        let mut entries = Self { begin: vec![0], ..Self::default() };
-        for line in lines {
-            for (other, position) in line {
-                entries.others.push(other);
-                entries.positions.push(position);
-            }
-            entries.begin.push(entries.others.len() as u32);
-        }
-        entries
-    }
-
-    fn values<'a>(&'a self, stiffness: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        self.positions.iter().map(|&at| stiffness[at as usize])
-    }
-
-    fn line<'a>(&'a self, line: usize, values: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
-        let range = self.begin[line] as usize..self.begin[line + 1] as usize;
-        self.others[range.clone()].iter().map(|&other| other as usize).zip(values[range].iter().copied())
-    }
-}
 
 /// Which unknowns are on the boundary, where their entries stand, and the analysis of the interior block.
 struct Split {
@@ -54,21 +21,8 @@ struct Split {
     boundary_block: Entries,
     /// `K_bi` by rows; empty if the interior may not follow.
     coupling: Entries,
-    interior: Option<Interior>,
-}
-
-/// The block `K_ii`: lower triangle by columns, diagonal first.
-struct Interior {
-    /// Local unknowns, ascending.
-    unknowns: Vec<u32>,
-    block: Entries,
-    cholesky: Analysis,
-}
-
-impl Interior {
-    fn lower(&self) -> Lower<'_> {
-        Lower { column_begin: &self.block.begin, rows: &self.block.others }
-    }
+    /// The block `K_ii`.
+    interior: Option<Submatrix>,
 }
 
 impl Split {
@@ -78,12 +32,11 @@ impl Split {
         let mut place = vec![u32::MAX; pattern.dofs()];
         boundary.iter().enumerate().for_each(|(k, &dof)| place[dof as usize] = k as u32);
         let is_boundary: Vec<bool> = place.iter().map(|&k| k != u32::MAX).collect();
-        let unknowns: Vec<u32> = (0..pattern.dofs() as u32).filter(|&dof| !is_boundary[dof as usize]).collect();
-        unknowns.iter().enumerate().for_each(|(k, &dof)| place[dof as usize] = k as u32);
+        let interior = (0..pattern.dofs()).filter(|&dof| !is_boundary[dof]);
+        interior.enumerate().for_each(|(k, dof)| place[dof] = k as u32);
 
         let mut boundary_block = vec![Vec::new(); boundary.len()];
         let mut coupling = vec![Vec::new(); if follows { boundary.len() } else { 0 }];
-        let mut interior_block = vec![Vec::new(); if follows { unknowns.len() } else { 0 }];
         for column in 0..pattern.dofs() {
             for at in pattern.column_begin[column]..pattern.column_begin[column + 1] {
                 let row = pattern.rows[at as usize] as usize;
@@ -92,26 +45,21 @@ impl Split {
                     (true, true) => boundary_block[c as usize].push((r, at)),
                     (true, false) if follows => coupling[r as usize].push((c, at)),
                     (false, true) if follows => coupling[c as usize].push((r, at)),
-                    (false, false) if follows => interior_block[c as usize].push((r, at)),
                     _ => {}
                 }
             }
         }
-        let interior = follows.then(|| {
-            let block = Entries::new(interior_block);
-            // The whole matrix' nested dissection, without the boundary.
-            let inside = whole.order.iter().filter(|&&dof| !is_boundary[dof as usize]);
-            let order: Vec<u32> = inside.map(|&dof| place[dof as usize]).collect();
-            let cholesky = Analysis::ordered(Lower { column_begin: &block.begin, rows: &block.others }, &order);
-            Interior { unknowns, block, cholesky }
-        });
+        // The whole matrix' nested dissection, without the boundary.
+        let inside = || whole.order.iter().copied().filter(|&dof| !is_boundary[dof as usize]).collect::<Vec<u32>>();
+        let interior = follows.then(|| Submatrix::new(pattern, &inside()));
         let (boundary_block, coupling) = (Entries::new(boundary_block), Entries::new(coupling));
         Self { boundary, boundary_block, coupling, interior }
     }
 
     fn values(&self, precision: Option<Precision>) -> Values {
-        let factor = |interior: &Interior| precision.map(|precision| Factor::new(&interior.cholesky, precision));
-        Values { boundary_block: Vec::new(), coupling: Vec::new(), interior: self.interior.as_ref().and_then(factor) }
+        let factor = |interior: &Submatrix| precision.map(|precision| interior.factor(precision));
+        let interior = self.interior.as_ref().and_then(factor);
+        Values { boundary_block: Vec::new(), coupling: Vec::new(), interior, weak: false }
     }
 }
 
@@ -120,7 +68,13 @@ struct Values {
     boundary_block: Vec<f64>,
     coupling: Vec<f64>,
     interior: Option<Factor>,
+    /// Whether the interior gives way far more easily somewhere than its unknowns do one by one.
+    weak: bool,
 }
+
+/// Least pivot, relative to the diagonal entry that it began as, from which an interior is weak. (Ordinary elements have 0.2
+/// and more, Poisson's ratio 0.4999 leaves 1e-3, bodies that are rigid but for their flow 1e-6.)
+const WEAK: f64 = 3e-4;
 
 /// As many must be alike, wherever they are, to be worked on together: a solve for [`WIDTH`] takes a good two solves for
 /// one (`benches/kernels.rs`).
@@ -175,23 +129,28 @@ impl Schur {
     pub fn update(&mut self, own: usize, subdomain: usize, stiffness: &[f64], common: bool) -> Result<(), NotDefinite> {
         let split = &*self.splits[own];
         let values = self.values.renew(own, common && self.together[own], || split.values(self.precision));
-        let refill = |to: &mut Vec<f64>, from: &Entries| {
-            to.clear();
-            to.extend(from.values(stiffness));
-        };
-        refill(&mut values.boundary_block, &split.boundary_block);
-        refill(&mut values.coupling, &split.coupling);
+        split.boundary_block.take(stiffness, &mut values.boundary_block);
+        split.coupling.take(stiffness, &mut values.coupling);
         let (Some(interior), Some(factor)) = (&split.interior, &mut values.interior) else { return Ok(()) };
         if let Some(precision) = self.precision.filter(|&precision| factor.precision() != precision) {
-            *factor = Factor::new(&interior.cholesky, precision);
+            *factor = interior.factor(precision);
         }
-        refill(&mut self.block, &interior.block);
-        let mut outcome = self.workspace.factorise(&interior.cholesky, interior.lower(), &self.block, factor);
-        if outcome.is_err() && factor.precision() == Precision::Single {
-            *factor = Factor::new(&interior.cholesky, Precision::Double);
-            outcome = self.workspace.factorise(&interior.cholesky, interior.lower(), &self.block, factor);
+        interior.block.take(stiffness, &mut self.block);
+        let mut factorise =
+            |factor: &mut Factor| self.workspace.factorise(&interior.cholesky, interior.lower(), &self.block, factor);
+        let mut outcome = factorise(factor);
+        let is_weak = |factor: &Factor| interior.least_pivot(factor, &self.block) < WEAK;
+        values.weak = outcome.is_err() || is_weak(factor);
+        if values.weak && factor.precision() == Precision::Single {
+            *factor = interior.factor(Precision::Double);
+            outcome = factorise(factor);
         }
         outcome.map_err(|breakdown| NotDefinite { subdomain, pivot: breakdown.place, dofs: interior.unknowns.len() })
+    }
+
+    /// Whether the interior of an own subdomain gives way far more easily somewhere than its unknowns do one by one.
+    pub fn is_weak(&self, own: usize) -> bool {
+        self.values.of(own).weak
     }
 
     /// Additions and multiplications of factorising the interior of an own subdomain.

@@ -63,6 +63,11 @@ impl<'a> RowSpace<'a> {
         ordered_sum(self.comm, &self.shares, partial, width)
     }
 
+    /// The `width` values of each subdomain, of all of them, on every rank. Collective.
+    pub fn of_all(&self, mine: &[f64], width: usize) -> Vec<f64> {
+        self.comm.all_gather(mine, &self.shares.counts(width))
+    }
+
     /// What `of` gives for rows, `width` numbers each, of all ranks in one order, on every rank. Collective.
     pub fn gather(&self, width: usize, of: impl Fn(usize) -> Option<Vec<f64>>) -> Vec<Vec<f64>> {
         let mine: Vec<u64> = self

@@ -13,6 +13,7 @@ pub mod dual;
 pub mod equilibrium;
 pub mod errors;
 pub mod forcing;
+pub mod held;
 pub mod loading;
 pub mod motion;
 pub mod problem;

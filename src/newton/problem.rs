@@ -129,11 +129,10 @@ impl TornProblem<'_> {
         if norms[0] == 0.0 { 0.0 } else { norms[0] / size }
     }
 
-    /// Adds to multipliers those of the gluing rows whose forces have this `change` by `B`.
-    pub fn add_gluing(&self, change: &[f64], lambda: &mut [f64]) {
-        let gluing =
-            self.constraints.rows.iter().zip(change).zip(lambda).filter(|((row, _), _)| row.kind == Kind::Gluing);
-        gluing.for_each(|((row, change), l)| *l += change / (row.length * row.length));
+    /// Adds to multipliers those of the rows of some kinds whose forces have this `change` by `B`.
+    pub fn add_forces(&self, change: &[f64], of: impl Fn(Kind) -> bool, lambda: &mut [f64]) {
+        let rows = self.constraints.rows.iter().zip(change).zip(lambda).filter(|((row, _), _)| of(row.kind));
+        rows.for_each(|((row, change), l)| *l += change / (row.length * row.length));
     }
 
     /// `c - B u`: what is left until each constraint holds. One neighbour exchange.

@@ -42,12 +42,14 @@ pub fn refine(
     (left, TURNS)
 }
 
-/// `r - K x`.
+/// `r - K x`; supports take what is left at unknowns that they hold still.
 fn remainder(factors: &Factors, tangents: &[Rc<Vec<f64>>], r: &Torn, x: &Torn) -> Torn {
     let of = |(own, x): (usize, &Vec<f64>)| {
         let mut product = vec![0.0; x.len()];
         factors.symbolic(own).pattern.multiply_add(&tangents[own], x, &mut product);
-        r[own].iter().zip(product).map(|(r, kx)| r - kx).collect()
+        let mut rest: Vec<f64> = r[own].iter().zip(product).map(|(r, kx)| r - kx).collect();
+        factors.held(own).iter().for_each(|&dof| rest[dof as usize] = 0.0);
+        rest
     };
     x.iter().enumerate().map(of).collect()
 }

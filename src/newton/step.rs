@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::basis::Bases;
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
+use super::held::Held;
 use super::motion;
 use super::problem::{State, TornProblem, dot};
 use super::program::{Found, ProgramSettings, ProgramState, Programs};
@@ -12,6 +13,8 @@ use super::recover;
 use super::refine::refine;
 use super::tangents::{Factorising, Tangents};
 use crate::assembly::flow::{self, Flow};
+use crate::constraint::Kind;
+use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::factor::NotDefinite;
@@ -67,20 +70,26 @@ pub struct StepSolver<'a> {
     /// Directions of flow in each own subdomain.
     flows: Vec<Flow>,
     tangents: Tangents,
+    /// For each own subdomain, unknowns that supports may keep at zero ([`crate::feti::supported`]).
+    supported: Vec<Vec<u32>>,
+    /// Whether any rank's subdomains are held still.
+    holds: bool,
 }
 
 impl<'a> StepSolver<'a> {
-    /// On factors and a projector set up for the problem's subdomains; `twins` numbers those that have congruent ones.
+    /// On factors and a projector set up for the problem's subdomains; `twins` numbers those that have congruent ones, `supported`
+    /// tells what their supports may keep at zero ([`crate::feti::supported`]).
     pub fn new(
         operator: DualOperator<'a>,
         projector: Projector<'a>,
         preconditioner: Option<Preconditioner<'a>>,
         settings: ProgramSettings,
         twins: Vec<Option<usize>>,
+        supported: Vec<Vec<u32>>,
     ) -> Self {
         let flows = vec![Flow::default(); twins.len()];
         let (programs, tangents) = (Programs::new(settings), Tangents::new(twins));
-        Self { operator, projector, preconditioner, programs, flows, tangents }
+        Self { operator, projector, preconditioner, programs, flows, tangents, supported, holds: false }
     }
 
     /// What the next steps depend on.
@@ -190,17 +199,19 @@ impl<'a> StepSolver<'a> {
         let factorisations = self.update_tangents(problem, (u, state), forcing.left, timer)?;
         let rows = problem.gather.rows();
 
-        let forces = problem.unbalance(state);
+        let mut forces = problem.unbalance(state);
+        let slack = problem.slack(u);
+        let mut open = slack.clone();
+        let lifted = self.held().map(|held| held.lift(problem, &mut forces, &mut open));
         let coarse = &self.projector.coarse;
         let warm = timer.time("coarse problem", || {
             let balance = recover::resultants(problem.subdomains, problem.modes, coarse, &forces);
             self.programs.start(&self.projector, rows, balance)
         });
-        let slack = problem.slack(u);
         let mut b = vec![0.0; rows];
         let mut torn = forces.clone();
         self.respond(&warm.lambda, &mut torn, &mut b, timer);
-        b.iter_mut().zip(&slack).for_each(|(b, s)| *b -= s);
+        b.iter_mut().zip(&open).for_each(|(b, s)| *b -= s);
 
         let dual = Dual {
             operator: &mut self.operator,
@@ -216,8 +227,8 @@ impl<'a> StepSolver<'a> {
         let mut defect = vec![0.0; rows];
         let mut du = forces.clone();
         self.respond(&balanced, &mut du, &mut defect, timer);
-        self.add_bonds(problem, [&mut lambda, &mut balanced]);
-        let mut local = forces;
+        self.add_hidden(problem, (&forces, &du), [&mut lambda, &mut balanced]);
+        let mut local = forces.clone();
         problem.gather.add_transpose(-1.0, &balanced, &mut local);
         let wanted = forcing.drop.max(EXACT);
         let norm = |x: &Torn| {
@@ -229,26 +240,43 @@ impl<'a> StepSolver<'a> {
         });
         if refined > 0 {
             self.operator.rejoin(&mut du);
-            self.add_bonds(problem, [&mut lambda, &mut balanced]);
+            self.add_hidden(problem, (&forces, &du), [&mut lambda, &mut balanced]);
             problem.gather.apply(&du, &mut defect);
         }
         self.programs.settle(&lambda);
-        defect.iter_mut().zip(&slack).for_each(|(d, s)| *d -= s);
+        defect.iter_mut().zip(&open).for_each(|(d, s)| *d -= s);
         if let Some(held) = self.programs.held() {
             let coarse = &self.projector.coarse;
             let back = timer.time("coarse problem", || motion::amplitudes(held, coarse, problem.space, &defect));
             recover::add_rigid_motion(problem, coarse, -1.0, &back, &mut du);
+        }
+        for (du, lifted) in du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {
+            *du += lifted;
         }
         self.mend(problem, &slack, &mut du, timer);
         let applications = self.operator.applications() - before + refined;
         Ok(Step { du, lambda, outcome, statistics, at_floor, local_residual, applications, factorisations })
     }
 
+    /// Adds to multipliers, the last of which are in balance, what the quadratic program does not see: what balances each member
+    /// of a cluster, and what supports carry that hold subdomains still.
+    fn add_hidden(&self, problem: &TornProblem, state: (&Torn, &Torn), [lambda, balanced]: [&mut Vec<f64>; 2]) {
+        self.add_bonds(problem, [&mut *lambda, &mut *balanced]);
+        if let Some(held) = self.held() {
+            held.add_reactions(problem, state, [lambda, balanced]);
+        }
+    }
+
     /// Adds to multipliers what balances each member of a cluster.
     pub(super) fn add_bonds<const N: usize>(&self, problem: &TornProblem, multipliers: [&mut Vec<f64>; N]) {
         if let Some(bonds) = self.operator.bonds() {
-            multipliers.into_iter().for_each(|lambda| problem.add_gluing(&bonds, lambda));
+            multipliers.into_iter().for_each(|lambda| problem.add_forces(&bonds, |kind| kind == Kind::Gluing, lambda));
         }
+    }
+
+    /// The subdomains that supports hold still; `None` if no rank has any.
+    fn held(&self) -> Option<Held<'_>> {
+        self.holds.then(|| Held { factors: &self.operator.factors, tangents: self.tangents.values() })
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.
@@ -292,14 +320,55 @@ impl<'a> StepSolver<'a> {
                 ));
             }
         }
-        if let Some(preconditioner) = &mut self.preconditioner {
-            let factors = &self.operator.factors;
-            let values = self.tangents.values().iter().enumerate();
-            let stiffness = values.map(|(own, values)| (&factors.symbolic(own).pattern, &values[..]));
-            preconditioner.scaling =
-                timer.time("scaling", || Scaling::new(problem.constraints, problem.gather, stiffness));
+        let is_weak =
+            |own| self.preconditioner.as_ref().is_some_and(|preconditioner| preconditioner.schur.is_weak(own));
+        let mine = factorised.iter().enumerate().flat_map(|(own, &fresh)| [fresh, f64::from(is_weak(own))]);
+        let all = problem.space.of_all(&mine.collect::<Vec<f64>>(), 2);
+        let (fresh, weak): (Vec<bool>, Vec<bool>) = all.as_chunks().0.iter().map(|[f, w]| (*f > 0.0, *w > 0.0)).unzip();
+        self.scale(problem, timer);
+        self.strengthen(problem, &weak, &fresh, timer)?;
+        Ok(fresh.into_iter().filter(|fresh| *fresh).count())
+    }
+
+    /// Scales the rows by the stiffness of the tangents.
+    fn scale(&mut self, problem: &TornProblem, timer: &Timer) {
+        let Some(preconditioner) = &mut self.preconditioner else { return };
+        let (factors, values) = (&self.operator.factors, self.tangents.values().iter().enumerate());
+        let stiffness = values.map(|(own, values)| (&factors.symbolic(own).pattern, &values[..]));
+        preconditioner.scaling = timer.time("scaling", || Scaling::new(problem.constraints, problem.gather, stiffness));
+    }
+
+    /// Deluxe scaling of faces beside weak subdomains, which supports hold still where they can; the preconditioner takes the
+    /// stiffness of both sides as it is now. Whether subdomains are `weak`, and their tangents `fresh`, is told of all.
+    fn strengthen(
+        &mut self,
+        problem: &TornProblem,
+        weak: &[bool],
+        fresh: &[bool],
+        timer: &Timer,
+    ) -> Result<(), String> {
+        let is_active = |preconditioner: &Preconditioner| preconditioner.deluxe.is_active();
+        if !weak.contains(&true) && !self.preconditioner.as_ref().is_some_and(is_active) {
+            return Ok(());
         }
-        Ok(problem.space.sum(&factorised, 1)[0] as usize)
+        self.holds = weak.contains(&true) && !self.operator.is_hybrid();
+        let Some(Preconditioner { deluxe, schur, .. }) = &self.preconditioner else { return Ok(()) };
+        let holds: Vec<bool> = (0..problem.subdomains.len()).map(|own| self.holds && schur.is_weak(own)).collect();
+        let beside: Vec<usize> = (0..problem.subdomains.len()).filter(|&own| deluxe.is_beside(own, weak)).collect();
+        let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
+        let follow = |own: usize| self.tangents.follow(own, problem.subdomains[own].id, &mut on);
+        let followed = beside.into_iter().try_for_each(follow);
+        let hold = |(own, subdomain): (usize, &Subdomain)| {
+            let held = if holds[own] { &self.supported[own][..] } else { &[] };
+            self.tangents.hold(own, subdomain, held, &mut on)
+        };
+        let outcome = followed.and_then(|()| problem.subdomains.iter().enumerate().try_for_each(hold));
+        agree_on(outcome.err(), problem)?;
+        let Some(Preconditioner { deluxe, schur, .. }) = &mut self.preconditioner else { return Ok(()) };
+        let (factors, values) = (&self.operator.factors, self.tangents.values());
+        let stiffness = |own: usize| (&**factors.symbolic(own), &values[own][..]);
+        timer.time("faces", || deluxe.update(weak, fresh, schur, stiffness));
+        Ok(())
     }
 }
 

@@ -7,6 +7,7 @@ use super::basis::{Bases, Basis};
 use super::problem::{State, TornProblem};
 use crate::assembly::flow::Flow;
 use crate::assembly::stiffness;
+use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::factor::{Factors, NotDefinite};
 use crate::feti::schur::Schur;
@@ -17,6 +18,10 @@ use crate::monitor::timing::Timer;
 /// level 2, 0.1 saves a quarter of its factorisations and costs no iteration; 0.3 saves three fifths, and costs a tenth
 /// more iterations.)
 const DRIFT: f64 = 0.1;
+
+/// Least pivot of a tangent's factor, relative to the diagonal entry that it began as, from which the preconditioner follows every
+/// change. (That of slender elastic subdomains is as small, which costs them nothing: they do not change.)
+const SOFT: f64 = 1e-3;
 
 /// What is factorised.
 pub struct Factorising<'s> {
@@ -166,15 +171,52 @@ impl Tangents {
             self.values[own] = Rc::clone(&values);
             let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common));
             on.timer.count("factorisation", on.factors.symbolic(own).analysis().flops(), 0.0);
+            // Of what has become soft little shows in the entries, which may be those of the volume.
             let drift = self.bases[own].drift;
+            let is_stale = || drift.is_nan() || drift > DRIFT || on.factors.least_pivot(own, &values) < SOFT;
             failure = match outcome {
-                Ok(()) if common || drift.is_nan() || drift > DRIFT => {
+                Ok(()) if common || is_stale() => {
                     self.take_interior(own, subdomain.id, &values, basis, common, on).err()
                 }
                 outcome => outcome.err(),
             };
         }
         (factorised, failure)
+    }
+
+    /// Gives the preconditioner the interior block of an own subdomain's tangent as it was factorised last, however little that
+    /// has changed. Local.
+    ///
+    /// # Errors
+    /// If it is singular.
+    pub fn follow(&mut self, own: usize, id: usize, on: &mut Factorising) -> Result<(), NotDefinite> {
+        let Bases { factor, interior, .. } = &self.bases[own];
+        let Some(basis) = factor.clone().filter(|_| interior != factor) else { return Ok(()) };
+        let common = self.twins[own].is_some() && basis == Basis::Elastic;
+        let values = Rc::clone(&self.values[own]);
+        self.take_interior(own, id, &values, basis, common, on)
+    }
+
+    /// Keeps unknowns of an own subdomain at zero from now on, none if `held` is empty, in the factor of its tangent as it was
+    /// factorised last. Local.
+    ///
+    /// # Errors
+    /// If it is singular.
+    pub fn hold(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        held: &[u32],
+        on: &mut Factorising,
+    ) -> Result<(), NotDefinite> {
+        if on.factors.held(own) == held {
+            return Ok(());
+        }
+        let values = &self.values[own];
+        on.timer.time("factorisation", || match held {
+            [] => on.factors.factorise(own, subdomain, values, false),
+            held => on.factors.hold(own, subdomain, values, held),
+        })
     }
 
     /// Gives an elastic subdomain what an elastic twin has already; `None` if there is none.

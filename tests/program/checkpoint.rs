@@ -143,6 +143,18 @@ fn a_run_stopped_at_any_moment_arrives_at_the_same_bits_on_other_ranks() {
     assert!(stopped > 0, "no moment was early enough");
 }
 
+/// Deluxe scaling and subdomains that supports hold still are not in a checkpoint: they follow from what is.
+#[test]
+fn a_rigid_body_that_flows_stopped_after_every_step_arrives_at_the_same_bits() {
+    let sets = [&COARSE[..], &["material.lower.young=2.1e11"]].concat();
+    let directory = tempfile::tempdir().unwrap();
+    let [whole, out] = ["whole", "stopped"].map(|name| directory.path().join(name));
+    assert_eq!(run_disturbed(2, &solve(&whole, &sets, &[]), |_| ()).code, 0);
+    let file = stopped_after(newton(&whole).len() - 2, &out, &sets);
+    assert_eq!(resume(3, &file).code, 0);
+    assert_same_result(&out, &whole, "two-blocks");
+}
+
 #[test]
 fn a_cascade_stopped_by_the_clock_goes_on_to_the_same_bits() {
     let whole = tempfile::tempdir().unwrap();

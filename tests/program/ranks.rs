@@ -63,6 +63,13 @@ fn sixteen_ranks_on_a_few_cores_give_the_bits_of_one() {
     assert!(assert_independent_of_ranks("two-blocks", &sets, &[1, 16])["subdomains"].as_u64() >= Some(24));
 }
 
+/// The lower body is rigid but for its flow: faces between its subdomains have a scaling of their own, supports hold some of them still.
+#[test]
+fn a_rigid_body_that_flows_gives_the_same_bits_on_1_2_3_and_5_ranks() {
+    let sets = [&COARSE[..], &["material.lower.young=2.1e11"]].concat();
+    assert_eq!(assert_independent_of_ranks("two-blocks", &sets, &RANKS)["subdomains"], 6);
+}
+
 /// A block from a mesh file that a rigid ball presses into, plastic under it.
 #[test]
 fn a_mesh_file_cut_into_1_7_24_and_60_parts_gives_one_energy_and_the_same_bits_on_1_2_and_3_ranks() {

@@ -5,6 +5,7 @@ use super::{Preconditioner, boundaries};
 use crate::constraint::Kind;
 use crate::decomposition::Subdomain;
 use crate::feti::cholesky::Precision;
+use crate::feti::deluxe::Deluxe;
 use crate::feti::factor::{Factors, analyse};
 use crate::feti::scaling::Scaling;
 use crate::feti::schur::Schur;
@@ -13,6 +14,7 @@ use crate::fixture::{
     two_bricks, two_bricks_by_metis,
 };
 use crate::scene::Scene;
+use crate::study::Discrete;
 
 /// The upper brick so flat that short edges tie the nodes of each column.
 const FLAT: &str = "body.upper.brick.size.2=0.2";
@@ -40,11 +42,24 @@ impl<'a> Case<'a> {
         for (k, values) in stiffnesses.iter().enumerate() {
             schur.update(k, k, values, false).expect("the interior is held by its boundary");
         }
-        let mut preconditioner = Preconditioner::new(&setup.gather, schur);
+        let Discrete { constraints, decomposition, .. } = &setup.discrete;
+        let deluxe = Deluxe::new(setup.comm, &decomposition.shares, constraints, &setup.gather, &schur);
+        let mut preconditioner = Preconditioner::new(&setup.gather, schur, deluxe);
         let stiffness = stiffnesses.iter().enumerate().map(|(k, values)| (&factors.symbolic(k).pattern, &values[..]));
         preconditioner.scaling = Scaling::new(&setup.discrete.constraints, &setup.gather, stiffness);
         preconditioner.scaling.restrict(&setup.discrete.constraints, kept);
         Self { preconditioner, factors, stiffnesses }
+    }
+
+    /// With deluxe scaling of all faces.
+    fn deluxe(setup: &'a Setup<'a>) -> Self {
+        let mut case = Self::new(setup, true, |_| true);
+        let (all, stiffnesses) = (vec![true; setup.discrete.decomposition.shares.total()], &case.stiffnesses);
+        let Preconditioner { deluxe, schur, .. } = &mut case.preconditioner;
+        let stiffness = |own: usize| (&**case.factors.symbolic(own), &stiffnesses[own][..]);
+        deluxe.update(&all, &all, schur, stiffness);
+        assert!(deluxe.is_active());
+        case
     }
 
     fn apply(&mut self, x: &[f64]) -> Vec<f64> {
@@ -139,6 +154,79 @@ fn lumped_and_dirichlet_equal_their_dense_formulas_with_all_rows_and_with_some()
     }
 }
 
+/// `B_D'` with the unknowns that one row of gluing alone touches shared out by `(S_1 + S_2)^-1 S_2`, for each pair of subdomains.
+fn dense_deluxe(setup: &Setup, scaled: &Mat<f64>, s: &Mat<f64>) -> Mat<f64> {
+    let b = setup.dense_rows();
+    let rows_at = |dof: usize| (0..b.nrows()).filter(|&row| b[(row, dof)] != 0.0).collect();
+    let touching: Vec<Vec<usize>> = (0..s.nrows()).map(rows_at).collect();
+    let dofs_of = |row: usize| (0..touching.len()).filter(|&dof| touching[dof].contains(&row)).collect::<Vec<usize>>();
+    let mut pairs: Vec<(Vec<u32>, Vec<usize>)> = Vec::new();
+    for (row, of_row) in setup.rows().iter().enumerate().filter(|(_, row)| row.kind == Kind::Gluing) {
+        if dofs_of(row).iter().all(|&dof| touching[dof] == [row]) {
+            let pair: Vec<u32> = of_row.terms.iter().map(|term| term.subdomain).collect();
+            match pairs.iter_mut().find(|(known, _)| *known == pair) {
+                Some((_, rows)) => rows.push(row),
+                None => pairs.push((pair, vec![row])),
+            }
+        }
+    }
+    assert!(!pairs.is_empty());
+    let mut result = scaled.transpose().to_owned();
+    for (_, rows) in pairs {
+        let n = rows.len();
+        let [first, second] = [0, 1].map(|side| rows.iter().map(|&row| dofs_of(row)[side]).collect::<Vec<usize>>());
+        let part = |dofs: &[usize]| Mat::from_fn(n, n, |i, j| s[(dofs[i], dofs[j])]);
+        let share = (part(&first) + part(&second)).partial_piv_lu().solve(part(&second));
+        for i in 0..n {
+            result.row_mut(first[i]).fill(0.0);
+            result.row_mut(second[i]).fill(0.0);
+            for (j, &row) in rows.iter().enumerate() {
+                let jump = 1.0 / b[(row, first[j])];
+                result[(first[i], row)] = jump * share[(i, j)];
+                result[(second[i], row)] = jump * (share[(i, j)] - f64::from(u8::from(i == j)));
+            }
+        }
+    }
+    result
+}
+
+#[test]
+fn deluxe_scaling_is_that_of_the_dense_formula_and_dual_to_the_rows() {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(7), two_bricks(&[FLAT])] {
+        on_ranks(&scene, 1, |setup| {
+            let mut case = Case::deluxe(setup);
+            let (b, stiffness) = (setup.dense_rows(), case.stiffness());
+            let scaled = dense_scaled_rows(&b, &dense_flexibility(setup, &stiffness), |_| true);
+            let s = dense_boundary_stiffness(&stiffness, &boundaries(&setup.gather, stiffness.len()), true);
+            let x = setup.multipliers(8);
+            let deluxe = dense_deluxe(setup, &scaled, &s);
+            assert_close(&(&b * (&deluxe * column(&x))), &column(&x), 1e-11);
+            let expected = deluxe.transpose() * s * &deluxe * column(&x);
+            assert_close(&column(&case.apply(&x)), &expected, 1e-11);
+        });
+    }
+}
+
+#[test]
+fn deluxe_scaling_has_the_same_bits_on_any_ranks_and_ends_once_nothing_is_weak() {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(7)] {
+        let special = same_on_any_ranks(&scene, |setup| {
+            let image = Case::deluxe(setup).apply(&setup.multipliers(12));
+            setup.owned(&image)
+        });
+        let [plain, back] = [false, true].map(|was_deluxe| {
+            same_on_any_ranks(&scene, |setup| {
+                let mut case = if was_deluxe { Case::deluxe(setup) } else { Case::new(setup, true, |_| true) };
+                let none = vec![false; setup.discrete.decomposition.shares.total()];
+                let Preconditioner { deluxe, schur, .. } = &mut case.preconditioner;
+                deluxe.update(&none, &none, schur, |_| panic!("no face has a scaling of its own"));
+                setup.owned(&case.apply(&setup.multipliers(12)))
+            })
+        });
+        assert!(plain == back && plain != special);
+    }
+}
+
 /// `B B_D' = I`, by way of `(B D^-1 B') (B D^-1 B')^-1 = I`.
 #[test]
 fn scaled_rows_are_dual_to_the_rows() {
@@ -184,9 +272,10 @@ fn the_preconditioned_operator_is_definite_on_symmetric_products() {
 #[test]
 fn mending_closes_the_defect_and_leaves_the_interior_without_force() {
     for scene in scenes() {
-        for (ranks, dirichlet) in [(1, false), (1, true), (3, true)] {
+        for (ranks, dirichlet, special) in [(1, false, false), (1, true, false), (3, true, false), (2, true, true)] {
             on_ranks(&scene, ranks, |setup| {
-                let Case { mut preconditioner, factors, stiffnesses } = Case::new(setup, dirichlet, |_| true);
+                let case = if special { Case::deluxe(setup) } else { Case::new(setup, dirichlet, |_| true) };
+                let Case { mut preconditioner, factors, stiffnesses } = case;
                 let mut u = setup.displacements(10);
                 let before = u.clone();
                 let wanted = setup.multipliers(11);
