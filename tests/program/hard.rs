@@ -176,7 +176,7 @@ fn supports_that_hold_subdomains_still_carry_and_move_as_others_do() {
         let run = solve(RANKS, "two-blocks", &[&sets[..], &[&name]].concat());
         run.converged().summary()
     });
-    assert!(number(&held, "hessian_multiplications") < 0.5 * number(&plain, "hessian_multiplications"));
+    assert!(number(&held, "hessian_multiplications") < 0.7 * number(&plain, "hessian_multiplications"));
     assert_close("energy", number(&held, "energy"), number(&plain, "energy"), 1e-9);
     for support in ["left", "right", "bent"] {
         let [held, plain] = [&held, &plain].map(|summary| vector(&summary["reactions"][support]));
