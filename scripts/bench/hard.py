@@ -112,6 +112,7 @@ CASES = [
     Case("lower body 1e6 times as stiff", ["material.lower.young=2.1e11", SOFT]),
     Case("lower body 1e6 times as stiff and as strong", STRONG),
     Case("lower body 1e6 times as stiff, as strong as before", ["material.lower.young=2.1e11"]),
+    Case("lower body 1e6 times as stiff, as strong as before, hex8", HEX8 + ["material.lower.young=2.1e11"], beside="benchmark, hex8"),
     Case(SAME_CORES, [], scene=CORES, beside="benchmark, hex8", same=("from a mesh, hex8", 1.0)),
     Case("cores 1e6 times as stiff, hex8", ["material.core.young=2.1e11", SOFT], scene=CORES, beside=SAME_CORES),
     Case("core 1e6 times as soft, hex8", SOFT_CORE, scene=CORES, beside=SAME_CORES),
