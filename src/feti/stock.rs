@@ -27,16 +27,6 @@ pub enum Batch {
     Twins(Vec<usize>),
 }
 
-impl Batch {
-    /// The subdomains.
-    pub fn members(&self) -> &[usize] {
-        match self {
-            Self::Alone(own) => std::slice::from_ref(own),
-            Self::Twins(twins) => twins,
-        }
-    }
-}
-
 impl<T> Stock<T> {
     /// One item for each own subdomain.
     pub fn new(items: impl IntoIterator<Item = T>) -> Self {
@@ -74,7 +64,11 @@ impl<T> Stock<T> {
 
     /// Sum over all batches of what is told of their items.
     pub fn sum(&self, of: impl Fn(&T) -> f64) -> f64 {
-        self.batches().iter().map(|batch| of(self.of(batch.members()[0]))).sum()
+        let first = |batch: &Batch| match batch {
+            Batch::Alone(own) => *own,
+            Batch::Twins(twins) => twins[0],
+        };
+        self.batches().iter().map(first).map(|own| of(self.of(own))).sum()
     }
 
     fn sort(&self) -> Vec<Batch> {

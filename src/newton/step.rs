@@ -72,8 +72,6 @@ pub struct StepSolver<'a> {
     tangents: Tangents,
     /// For each own subdomain, unknowns that supports may keep at zero ([`crate::feti::supported`]).
     supported: Vec<Vec<u32>>,
-    /// Whether any rank's subdomains are held still.
-    holds: bool,
 }
 
 impl<'a> StepSolver<'a> {
@@ -89,7 +87,7 @@ impl<'a> StepSolver<'a> {
     ) -> Self {
         let flows = vec![Flow::default(); twins.len()];
         let (programs, tangents) = (Programs::new(settings), Tangents::new(twins));
-        Self { operator, projector, preconditioner, programs, flows, tangents, supported, holds: false }
+        Self { operator, projector, preconditioner, programs, flows, tangents, supported }
     }
 
     /// What the next steps depend on.
@@ -276,7 +274,9 @@ impl<'a> StepSolver<'a> {
 
     /// The subdomains that supports hold still; `None` if no rank has any.
     fn held(&self) -> Option<Held<'_>> {
-        self.holds.then(|| Held { factors: &self.operator.factors, tangents: self.tangents.values() })
+        let is_active = self.preconditioner.as_ref().is_some_and(|preconditioner| preconditioner.deluxe.is_active());
+        (is_active && !self.operator.is_hybrid())
+            .then(|| Held { factors: &self.operator.factors, tangents: self.tangents.values() })
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.
@@ -351,9 +351,9 @@ impl<'a> StepSolver<'a> {
         if !weak.contains(&true) && !self.preconditioner.as_ref().is_some_and(is_active) {
             return Ok(());
         }
-        self.holds = weak.contains(&true) && !self.operator.is_hybrid();
+        let may_hold = !self.operator.is_hybrid();
         let Some(Preconditioner { deluxe, schur, .. }) = &self.preconditioner else { return Ok(()) };
-        let holds: Vec<bool> = (0..problem.subdomains.len()).map(|own| self.holds && schur.is_weak(own)).collect();
+        let holds: Vec<bool> = (0..problem.subdomains.len()).map(|own| may_hold && schur.is_weak(own)).collect();
         let beside: Vec<usize> = (0..problem.subdomains.len()).filter(|&own| deluxe.is_beside(own, weak)).collect();
         let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
         let follow = |own: usize| self.tangents.follow(own, problem.subdomains[own].id, &mut on);
