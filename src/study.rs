@@ -297,9 +297,9 @@ pub fn solve_from(
             report.borrow_mut()(Event::Warning(format!("{place}: {reason}; the increment is halved")));
         }
         Progress::Solution(at, solution) => {
-            let contact = contact_states(problem, &discrete.pairs, solution);
+            let contact = contact_states(problem, solution);
             let (piece, rows) = &mut *reached.borrow_mut();
-            let von_mises = fields::record(piece, at.time(), problem, solution, &discrete.pairs, &contact);
+            let von_mises = fields::record(piece, at.time(), problem, solution, discrete.touching(), &contact);
             rows.push(step_row(scene, discrete, problem, at, solution, &contact, von_mises));
             closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
         }

@@ -18,7 +18,7 @@ const PARALLEL: f64 = 1.0 - 1e-12;
 /// Nodes of a pair and their factors in its condition.
 pub(super) fn nodes(pair: &ContactPair) -> impl Iterator<Item = (u64, f64)> {
     let masters = pair.masters.iter().map(|(node, weight)| (*node, -weight));
-    [(pair.slave, 1.0)].into_iter().chain(pair.others.iter().copied()).chain(masters)
+    pair.slaves.iter().copied().chain(masters)
 }
 
 /// The row of a pair; `sides` knows its nodes.

@@ -174,9 +174,9 @@ fn node(node: u64, copies: &[u32]) -> InterfaceNode {
     InterfaceNode { node, copies: copies.to_vec(), surfaces: vec![] }
 }
 
-fn pair(others: &[(u64, f64)], masters: &[(u64, f64)]) -> ContactPair {
-    let (others, masters) = (others.to_vec(), masters.to_vec());
-    ContactPair { contact: 0, slave: 7, others, masters, normal: [0.6, 0.0, 0.8], gap: 0.5, area: 1.0 }
+fn pair(slaves: &[(u64, f64)], masters: &[(u64, f64)]) -> ContactPair {
+    let (slaves, masters, normal) = (slaves.to_vec(), masters.to_vec(), [0.6, 0.0, 0.8]);
+    ContactPair { contact: 0, slave: 7, part: 0, slaves, masters, normal, gap: 0.5, area: 1.0, covered: true }
 }
 
 /// Sum of a row's coefficients at a node, as before it was made a unit vector.
@@ -186,7 +186,7 @@ fn coefficient(row: &Row, node: u64, axis: usize) -> f64 {
 
 #[test]
 fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_hand_side() {
-    let pair = pair(&[(6, 0.5)], &[(8, 0.75), (9, 0.75)]);
+    let pair = pair(&[(7, 1.0), (6, 0.5)], &[(8, 0.75), (9, 0.75)]);
     let nodes = [node(6, &[3]), node(7, &[0, 3]), node(8, &[1, 2, 4]), node(9, &[2])];
     let (held, free) = ([Some((0, 0.25)), None, None], [None; 3]);
     let side = |number: u64, fixed: [Option<(usize, f64)>; 3]| (&nodes[number as usize - 6], fixed);
@@ -216,7 +216,7 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
 fn of_contacts_in_one_direction_the_tightest_counts() {
     let slave = node(7, &[0, 3]);
     let row = |number: usize, gap: f64, normal: [f64; 3]| {
-        let pair = ContactPair { gap, normal, ..pair(&[], &[]) };
+        let pair = ContactPair { gap, normal, ..pair(&[(7, 1.0)], &[]) };
         contact::row(number, &pair, |_| (&slave, [None; 3])).expect("it is free")
     };
     let (up, down) = ([0.6, 0.0, 0.8], [-0.6, 0.0, -0.8]);

@@ -81,11 +81,13 @@ mod tests {
         let pair = |(contact, &normal): (usize, &[f64; 3])| ContactPair {
             contact,
             slave: 7,
-            others: Vec::new(),
+            part: 0,
+            slaves: vec![(7, 1.0)],
             masters: Vec::new(),
             normal: unit(normal).expect("not zero"),
             gap: 0.0,
             area: 1.0,
+            covered: true,
         };
         let pairs: Vec<ContactPair> = normals.iter().enumerate().map(pair).collect();
         check(&names, &pairs, |nodes| vec![held; nodes.len()])

@@ -1,31 +1,46 @@
 //! Pairs of coinciding meshes: every slave node that has a master node opposite along its normal.
 //!
-//! Slave nodes beyond the edge of the master surface carry no contact.
+//! Surfaces face each other only where their normals do: what looks away from the slave, or stands at a right angle to it, is
+//! not opposite. Slave nodes beyond the edge of the master surface carry no contact, and of those at its edge only the faces
+//! that are covered count.
 
 use std::collections::HashSet;
 
-use super::ContactPair;
-use super::surface::{GatheredSurface, difference, dot};
+use super::surface::{FACING, GatheredSurface, difference, dot};
 use super::tree::BallTree;
+use super::{Conditions, ContactPair, MasterNode};
+use crate::mesh::surface;
 
 /// How far, in edge lengths of the master surface, a master node may lie beside the slave node's normal.
 const TOLERANCE: f64 = 1e-6;
 
-/// Pairs of contact number `contact`, ascending by slave node. `None` if the surfaces do not match: if a node of one side
-/// has the other side opposite but none of its nodes, or if nodes match but triangles do not.
-pub fn pair(contact: usize, slave: &GatheredSurface, master: &GatheredSurface) -> Option<Vec<ContactPair>> {
+/// Conditions of contact number `contact`. `None` if the surfaces do not match: if a node of one side has the other side
+/// opposite but none of its nodes, or if nodes match but triangles do not.
+pub fn pair(contact: usize, slave: &GatheredSurface, master: &GatheredSurface) -> Option<Conditions> {
     let opposite = opposite_nodes(slave, master)?;
     let back = opposite_nodes(master, slave)?;
     if differ(slave, master, &opposite) || differ(master, slave, &back) {
         return None;
     }
-    let found = opposite.into_iter().zip(slave.normals_and_areas()).zip(&slave.nodes);
-    let pairs = found.filter_map(|((opposite, (normal, area)), &slave)| {
-        let (node, gap) = opposite?;
-        let masters = vec![(master.nodes[node], 1.0)];
-        Some(ContactPair { contact, slave, others: Vec::new(), masters, normal, gap, area })
-    });
-    Some(pairs.collect())
+    let normals: Vec<[f64; 3]> = slave.normals_and_areas().into_iter().map(|(normal, _)| normal).collect();
+    let areas = slave.covered_areas(&normals, |node| opposite[node].is_some());
+    let mut found = Conditions::default();
+    for (k, (opposite, area)) in opposite.into_iter().zip(areas).enumerate() {
+        let Some((node, gap)) = opposite.filter(|_| area > 0.0) else { continue };
+        found.masters.push(MasterNode { node: master.nodes[node], pairs: vec![(found.pairs.len(), 1.0)] });
+        found.pairs.push(ContactPair {
+            contact,
+            slave: slave.nodes[k],
+            part: slave.parts[k],
+            slaves: vec![(slave.nodes[k], 1.0)],
+            masters: vec![(master.nodes[node], 1.0)],
+            normal: normals[k],
+            gap,
+            area,
+            covered: true,
+        });
+    }
+    Some(found)
 }
 
 /// Whether one surface has a triangle whose corners have opposite nodes that are no triangle of the other.
@@ -45,11 +60,16 @@ fn differ(one: &GatheredSurface, other: &GatheredSurface, opposite: &[Option<(us
 /// For each node of one surface the node of the other that is opposite, and its distance. `None` if only the surface is.
 fn opposite_nodes(one: &GatheredSurface, other: &GatheredSurface) -> Option<Vec<Option<(usize, f64)>>> {
     let spacing = other.spacing();
-    let tree = BallTree::new(&other.corners().collect::<Vec<_>>());
+    let corners: Vec<_> = other.corners().collect();
+    let tree = BallTree::new(&corners);
+    let facing = |triangle: &usize, normal| {
+        surface::normal(&corners[*triangle]).is_some_and(|other| dot(normal, other) < -FACING)
+    };
     let nodes = one.points.iter().zip(one.normals_and_areas());
     nodes
         .map(|(&point, (normal, _))| {
-            let triangles = tree.along(point, normal, spacing);
+            let mut triangles = tree.along(point, normal, spacing);
+            triangles.retain(|triangle| facing(triangle, normal));
             match opposite(other, &triangles, point, normal, spacing) {
                 None if hits(other, &triangles, point, normal, spacing) => None,
                 found => Some(found),
@@ -113,19 +133,14 @@ mod tests {
         }
         let h = size / n as f64;
         let points = (0..(n + 1) * (n + 1)).map(|k| [(k % (n + 1)) as f64 * h, (k / (n + 1)) as f64 * h, z]).collect();
-        GatheredSurface {
-            nodes: (0..((n + 1) * (n + 1)) as u64).map(|k| first + k).collect(),
-            points,
-            triangles,
-            share: 1.0,
-            quadratic: Vec::new(),
-        }
+        let nodes: Vec<u64> = (0..((n + 1) * (n + 1)) as u64).map(|k| first + k).collect();
+        GatheredSurface { parts: vec![0; nodes.len()], nodes, points, triangles, share: 1.0, quadratic: Vec::new() }
     }
 
     #[test]
     fn matching_squares_pair_with_gap_normal_and_area() {
         for gap in [0.0, 0.3, 7.0, -0.2] {
-            let pairs = pair(0, &square(4, 1.0, gap, false, 100), &square(4, 1.0, 0.0, true, 0)).expect("they match");
+            let pairs = pair(0, &square(4, 1.0, gap, false, 100), &square(4, 1.0, 0.0, true, 0)).expect("they match").pairs;
             assert_eq!(pairs.len(), 25);
             for p in &pairs {
                 assert_eq!(p.masters, [(p.slave - 100, 1.0)]);
@@ -156,7 +171,8 @@ mod tests {
         let (up, down) = (square(4, 1.0, 0.0, true, 0), || square(4, 1.0, 0.3, false, 100));
         assert_eq!(pair(0, &cut_twice(down()), &up), None);
         assert_eq!(pair(0, &down(), &cut_twice(up)), None);
-        let pairs = pair(0, &cut_twice(down()), &cut_twice(square(4, 1.0, 0.0, true, 0))).expect("they match");
+        let found = pair(0, &cut_twice(down()), &cut_twice(square(4, 1.0, 0.0, true, 0)));
+        let pairs = found.expect("they match").pairs;
         assert!((pairs.iter().map(|p| p.area).sum::<f64>() - 1.0).abs() < 1e-14);
         let corner = pairs.iter().find(|p| p.slave == 100).expect("all nodes are paired");
         assert!((corner.area - 1.0 / 64.0).abs() < 1e-15);
@@ -164,8 +180,25 @@ mod tests {
 
     #[test]
     fn nodes_beyond_the_master_carry_no_contact() {
-        let pairs = pair(0, &square(4, 2.0, 0.0, false, 100), &square(2, 1.0, 0.0, true, 0)).expect("they match");
-        assert_eq!(pairs.len(), 9);
+        let found = pair(0, &square(4, 2.0, 0.0, false, 100), &square(2, 1.0, 0.0, true, 0)).expect("they match");
+        assert_eq!(found.pairs.len(), 9);
+        // What they carry acts on the covered part alone.
+        assert!((found.pairs.iter().map(|p| p.area).sum::<f64>() - 1.0).abs() < 1e-15);
+        let at = |node: u64| found.pairs.iter().find(|p| p.slave == node).expect("it is covered").area;
+        assert!((at(100) + at(102) + at(110) + at(112) - 0.25).abs() < 1e-15);
+        // Squares that have only an edge in common, or a corner, have no area to press on.
+        let mut beside = square(2, 1.0, 0.0, true, 0);
+        beside.points.iter_mut().for_each(|p| p[0] += 1.0);
+        assert_eq!(pair(0, &square(2, 1.0, 0.0, false, 100), &beside), Some(Conditions::default()));
+    }
+
+    #[test]
+    fn surfaces_that_look_away_or_stand_at_a_right_angle_are_not_opposite() {
+        let slave = square(3, 1.0, 0.0, false, 100);
+        assert_eq!(pair(0, &slave, &square(3, 1.0, 0.0, false, 0)), Some(Conditions::default()));
+        let mut upright = square(3, 1.0, 0.0, true, 0);
+        upright.points.iter_mut().for_each(|p| *p = [p[0], 0.0, p[1]]);
+        assert_eq!(pair(0, &slave, &upright), Some(Conditions::default()));
     }
 
     #[test]
@@ -176,6 +209,6 @@ mod tests {
         assert_eq!(pair(0, &square(2, 1.0, 0.0, false, 100), &square(4, 1.0, 0.0, true, 0)), None);
         let mut far = square(2, 1.0, 0.0, true, 0);
         far.points.iter_mut().for_each(|p| p[0] += 10.0);
-        assert_eq!(pair(0, &square(2, 1.0, 0.0, false, 100), &far), Some(Vec::new()));
+        assert_eq!(pair(0, &square(2, 1.0, 0.0, false, 100), &far), Some(Conditions::default()));
     }
 }

@@ -9,64 +9,80 @@
 pub mod clip;
 pub mod corner;
 pub mod dual;
+pub mod edge;
 pub mod matching;
 pub mod mortar;
 pub mod pairing;
 pub mod quadratic;
 pub mod rigid;
+pub mod smooth;
 pub mod surface;
 pub mod tree;
 
 use thiserror::Error;
 
-/// A node of the slave surface and what it meets: linearised frictionless contact
-/// `normal . (u_slave + sum of weight u_other - sum of weight u_master) <= gap`.
+/// A condition on the slave surface, named after one of its nodes: linearised frictionless contact
+/// `normal . (sum of weight u_slave - sum of weight u_master) <= gap`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactPair {
     /// Index of the contact in the scene.
     pub contact: usize,
-    /// Global node on the slave surface.
+    /// Global node on the slave surface that the condition is named after.
     pub slave: u64,
-    /// Other nodes of the slave surface in the condition: some that supports hold, corners of a quadratic face; usually
-    /// none.
-    pub others: Vec<(u64, f64)>,
-    /// Global nodes on the master surface with their weights, which add up to those of the slave side; none on a rigid
-    /// obstacle.
+    /// Number of the smooth part of the surface around that node: each has a normal, and a condition, of its own
+    /// ([`smooth`]).
+    pub part: u32,
+    /// Global nodes on the slave surface with their weights, which add up to one: usually that node alone.
+    pub slaves: Vec<(u64, f64)>,
+    /// Global nodes on the master surface with their weights, which add up to one; none on a rigid obstacle.
     pub masters: Vec<(u64, f64)>,
     /// Unit vector towards the other side. Between surfaces: the outward normal of the slave surface at the node, mean of
     /// the adjacent triangles' area vectors. At a rigid obstacle: straight into it.
     pub normal: [f64; 3],
-    /// Initial distance along the normal (length), times the sum of the slave side's weights; negative where the bodies
-    /// overlap.
+    /// Initial distance along the normal (length); negative where the bodies overlap.
     pub gap: f64,
-    /// Share of the slave surface that belongs to the node, seen along its outward normal: pressure is force on the condition
-    /// over this area. A third of the adjacent triangles; of their part that faces the master surface where meshes do not
-    /// match.
+    /// Share of the slave surface that belongs to the condition, seen along its outward normal: pressure is force over this
+    /// area. Only what has the other side opposite counts.
     pub area: f64,
+    /// Whether the node has the other side opposite; else the condition is at the edge of the other side, near it.
+    pub covered: bool,
 }
 
 impl ContactPair {
     /// Puts the other side at this distance along the normal (length).
     pub fn set_distance(&mut self, distance: f64) {
-        self.gap = 0.0;
-        self.widen(distance);
+        self.gap = distance;
     }
 
     /// Moves the other side away along the normal (length).
     pub fn widen(&mut self, distance: f64) {
-        self.gap += self.factor() * distance;
-    }
-
-    /// What the factors of the slave side's nodes add up to: the condition is met at this many times the distance.
-    pub fn factor(&self) -> f64 {
-        1.0 + self.others.iter().map(|(_, weight)| weight).sum::<f64>()
+        self.gap += distance;
     }
 
     /// Force on the slave surface where the condition is met with this force: the master's nodes take all of it.
     pub fn force(&self, force: f64) -> [f64; 3] {
-        let factor = self.factor();
-        self.normal.map(|n| -factor * force * n)
+        self.normal.map(|n| -force * n)
     }
+}
+
+/// A node of the master surface that has slave nodes opposite: what the pressure is there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MasterNode {
+    /// Global node.
+    pub node: u64,
+    /// Indices of conditions with weights, which add up to one: its pressure is the mean of theirs.
+    pub pairs: Vec<(usize, f64)>,
+}
+
+/// The conditions of one contact.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Conditions {
+    /// Ascending by slave node and part.
+    pub pairs: Vec<ContactPair>,
+    /// Nodes of the master surface within the slave's reach, by the indices of these pairs.
+    pub masters: Vec<MasterNode>,
+    /// Slave nodes that carry no condition because supports hold them.
+    pub held: usize,
 }
 
 /// Why two surfaces cannot be paired.

@@ -5,7 +5,7 @@
 //! enter between its own. If that does not decide either, it is the one named first.
 
 use super::surface::GatheredSurface;
-use super::{ContactError, ContactPair, matching, mortar, quadratic};
+use super::{Conditions, ContactError, ContactPair, matching, mortar, quadratic};
 
 /// What the conditions on the slave nodes are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub enum Rule {
 /// Directions that supports fix at each of some nodes. Collective.
 pub type HeldNodes<'a> = &'a dyn Fn(&[u64]) -> Vec<[bool; 3]>;
 
-/// Conditions of contact number `contact`, ascending by slave node. Collective.
+/// Conditions of contact number `contact`. Collective.
 ///
 /// # Errors
 /// If the surfaces do not face each other, or supports hold all slave nodes that do.
@@ -29,14 +29,14 @@ pub fn pair(
     slave: &GatheredSurface,
     master: &GatheredSurface,
     held: HeldNodes,
-) -> Result<(Vec<ContactPair>, Rule), ContactError> {
+) -> Result<(Conditions, Rule), ContactError> {
     let quadratic = [slave, master].map(|surface| !surface.quadratic.is_empty());
     match (matching::pair(contact, slave, master), quadratic) {
-        (Some(pairs), _) if pairs.is_empty() => Err(ContactError::Apart { name: name.to_owned() }),
-        (Some(pairs), [false, false]) => Ok((pairs, Rule::NodeToNode)),
-        (Some(pairs), [true, true]) => {
+        (Some(found), _) if found.pairs.is_empty() => Err(ContactError::Apart { name: name.to_owned() }),
+        (Some(found), [false, false]) => Ok((found, Rule::NodeToNode)),
+        (Some(found), [true, true]) => {
             let gap = |pair: &ContactPair, along| quadratic::distance(slave, master, pair, along);
-            Ok((quadratic::conditions(slave, pairs, gap), Rule::NodeToNode))
+            Ok((Conditions { pairs: quadratic::conditions(slave, found.pairs, gap), ..found }, Rule::NodeToNode))
         }
         _ => Ok((mortar::pair(contact, name, slave, master, &held(&slave.nodes))?, Rule::Mortar)),
     }
@@ -51,21 +51,18 @@ pub fn choose(
     name: &str,
     surfaces: [&GatheredSurface; 2],
     held: HeldNodes,
-) -> Result<(usize, Vec<ContactPair>, Rule), ContactError> {
+) -> Result<(usize, Conditions, Rule), ContactError> {
     let [one, other] = surfaces;
     let first = pair(contact, name, one, other, held);
-    if let Ok((pairs, Rule::NodeToNode)) = first {
-        return Ok((0, pairs, Rule::NodeToNode));
+    if let Ok((found, Rule::NodeToNode)) = first {
+        return Ok((0, found, Rule::NodeToNode));
     }
     let second = pair(contact, name, other, one, held);
-    // A slave node that supports hold shows in the conditions around it.
-    let rank = |(pairs, _): &(Vec<ContactPair>, Rule)| {
-        (pairs.iter().any(|pair| !pair.others.is_empty()), usize::MAX - pairs.len())
-    };
+    let rank = |(found, _): &(Conditions, Rule)| (found.held > 0, usize::MAX - found.pairs.len());
     match (first, second) {
         (Ok(first), Ok(second)) if rank(&second) < rank(&first) => Ok((1, second.0, second.1)),
-        (Err(_), Ok((pairs, rule))) => Ok((1, pairs, rule)),
-        (Ok((pairs, rule)), _) => Ok((0, pairs, rule)),
+        (Err(_), Ok((found, rule))) => Ok((1, found, rule)),
+        (Ok((found, rule)), _) => Ok((0, found, rule)),
         (Err(error), Err(_)) => Err(error),
     }
 }
@@ -87,7 +84,7 @@ mod tests {
             nodes.iter().map(|n| [false, false, all || all_held.contains(n)]).collect()
         };
         let found = choose(0, "joint", [one, other], &held);
-        found.ok().map(|(slave, pairs, rule)| (slave, pairs.len(), rule))
+        found.ok().map(|(slave, found, rule)| (slave, found.pairs.len(), rule))
     }
 
     #[test]
@@ -110,10 +107,10 @@ mod tests {
     fn another_order_of_the_two_is_the_same_contact() {
         let [fine, coarse] = squares(5, 3);
         let free = |nodes: &[u64]| vec![[false; 3]; nodes.len()];
-        let (slave, pairs, _) = choose(0, "joint", [&fine, &coarse], &free).expect("they face each other");
+        let (slave, found, _) = choose(0, "joint", [&fine, &coarse], &free).expect("they face each other");
         let (turned, same, _) = choose(0, "joint", [&coarse, &fine], &free).expect("they face each other");
         assert_eq!((slave, turned), (0, 1));
-        assert_eq!(pairs, same);
+        assert_eq!(found, same);
     }
 
     #[test]
@@ -121,10 +118,12 @@ mod tests {
         let [one, other] = squares(4, 3);
         let mut further = grid([4, 4], 100, true, |x, y| [x, y, 0.35]);
         let held: Vec<[bool; 3]> = one.nodes.iter().map(|n| [false, false, n % 5 == 0]).collect();
-        let pairs = mortar::pair(0, "joint", &one, &other, &held).expect("they face each other");
-        assert!(pairs.iter().any(|pair| !pair.others.is_empty()));
+        let found = mortar::pair(0, "joint", &one, &other, &held).expect("they face each other");
+        assert_eq!(found.held, 5);
+        assert!(found.pairs.iter().any(|pair| pair.slaves.len() > 1));
         further.nodes = one.nodes;
-        for (mut pair, expected) in pairs.into_iter().zip(mortar::pair(0, "joint", &further, &other, &held).unwrap()) {
+        let expected = mortar::pair(0, "joint", &further, &other, &held).expect("they face each other");
+        for (mut pair, expected) in found.pairs.into_iter().zip(expected.pairs) {
             let near = |gap: f64| (gap - expected.gap).abs() < 1e-13;
             pair.widen(0.25);
             assert!(near(pair.gap));

@@ -8,27 +8,27 @@
 //! `phi~_corner = phi_corner + s * sum of phi_middle over its edges,   phi~_middle = (1 - 2 s) phi_middle`
 //!
 //! Then the coefficient of a corner is its displacement, that of the middle `m` of the edge `a b` is
-//! `(u_m - s (u_a + u_b)) / (1 - 2 s)`, and with multipliers dual to that basis there is one condition a coefficient. All
+//! `(u_m - s (u_a + u_b)) / (1 - 2 s)`, whose weights add up to one, and with multipliers dual to that basis there is one condition a coefficient. All
 //! multipliers are forces of the same sense, and a constant pressure passes exactly where meshes match. Nodes meet nodes
 //! here; [`super::mortar`] is for meshes that do not match.
 
 use std::collections::{BTreeMap, HashMap};
 
 use super::ContactPair;
-use super::surface::{GatheredSurface, dot};
+use super::surface::{GatheredSurface, difference, dot};
 
 /// What a corner gets of the function of an edge's middle.
 pub const SHARE: f64 = 0.2;
 
-/// Area that belongs to the condition of each node: of a corner the integral of its function, `2/3 s A` of each face `A`. The
-/// condition of a middle is taken times `1 - 2 s`, so that its node has the factor one; its area is `A / 3`.
-pub(super) fn areas(surface: &GatheredSurface) -> Vec<f64> {
+/// Area that belongs to the condition of each node, of the faces that count: of a corner the integral of its function, `2/3 s A`
+/// of each face `A`, of a middle the integral of its own, `(1 - 2 s) A / 3`.
+pub(super) fn areas(surface: &GatheredSurface, counts: impl Fn(&[usize; 6]) -> bool) -> Vec<f64> {
     let mut areas = vec![0.0; surface.nodes.len()];
     let of_triangles: Vec<f64> = surface.corners().map(|corners| crate::mesh::surface::area(&corners)).collect();
-    for (face, parts) in surface.quadratic.iter().zip(of_triangles.chunks_exact(4)) {
+    for (face, parts) in surface.quadratic.iter().zip(of_triangles.chunks_exact(4)).filter(|(face, _)| counts(face)) {
         let third = parts.iter().sum::<f64>() / 3.0;
         face[..3].iter().for_each(|&corner| areas[corner] += 2.0 * SHARE * third);
-        face[3..].iter().for_each(|&middle| areas[middle] += third);
+        face[3..].iter().for_each(|&middle| areas[middle] += (1.0 - 2.0 * SHARE) * third);
     }
     areas
 }
@@ -40,22 +40,24 @@ pub fn conditions(
     pairs: Vec<ContactPair>,
     gap: impl Fn(&ContactPair, [f64; 3]) -> f64,
 ) -> Vec<ContactPair> {
-    let mut ends: BTreeMap<u64, [u64; 2]> = BTreeMap::new();
+    let mut ends: BTreeMap<(u64, u32), [(u64, u32); 2]> = BTreeMap::new();
     for face in &slave.quadratic {
-        let nodes = face.map(|node| slave.nodes[node]);
+        let nodes = face.map(|node| (slave.nodes[node], slave.parts[node]));
         (0..3).for_each(|k| {
             ends.insert(nodes[3 + k], [nodes[k], nodes[(k + 1) % 3]]);
         });
     }
-    let of_node: HashMap<u64, &ContactPair> = pairs.iter().map(|pair| (pair.slave, pair)).collect();
+    let of_node: HashMap<(u64, u32), &ContactPair> = pairs.iter().map(|pair| ((pair.slave, pair.part), pair)).collect();
     let condition = |pair: &ContactPair| {
-        let Some(ends) = ends.get(&pair.slave) else { return Some(pair.clone()) };
-        let mut result = pair.clone();
+        let Some(ends) = ends.get(&(pair.slave, pair.part)) else { return Some(pair.clone()) };
+        let (own, share) = (1.0 / (1.0 - 2.0 * SHARE), -SHARE / (1.0 - 2.0 * SHARE));
+        let mut result = ContactPair { gap: own * pair.gap, ..pair.clone() };
+        result.slaves.iter_mut().chain(&mut result.masters).for_each(|(_, weight)| *weight *= own);
         for end in ends {
             let corner = of_node.get(end)?;
-            result.others.push((*end, -SHARE));
-            result.masters.extend(corner.masters.iter().map(|(node, weight)| (*node, -SHARE * weight)));
-            result.gap -= SHARE * gap(corner, pair.normal);
+            result.slaves.push((end.0, share));
+            result.masters.extend(corner.masters.iter().map(|(node, weight)| (*node, share * weight)));
+            result.gap += share * gap(corner, pair.normal);
         }
         Some(result)
     };
@@ -67,7 +69,7 @@ pub fn distance(slave: &GatheredSurface, master: &GatheredSurface, pair: &Contac
     let place = |surface: &GatheredSurface, node: u64| {
         surface.points[surface.nodes.binary_search(&node).expect("it is on the surface")]
     };
-    dot(direction, place(master, pair.masters[0].0)) - dot(direction, place(slave, pair.slave))
+    dot(direction, difference(place(master, pair.masters[0].0), place(slave, pair.slave)))
 }
 
 #[cfg(test)]
@@ -88,6 +90,7 @@ mod tests {
         let cut = |&[a, b, c, ab, bc, ca]: &[usize; 6]| [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
         GatheredSurface {
             nodes: (0..9).map(|k| first + k).collect(),
+            parts: vec![0; 9],
             points: (0..9).map(|k| [(k % 3) as f64, (k / 3) as f64, z]).collect(),
             triangles: quadratic.iter().flat_map(cut).collect(),
             share: 1.0,
@@ -99,18 +102,18 @@ mod tests {
     #[test]
     fn a_constant_pressure_passes_exactly() {
         let (slave, master) = (square(0.3, 100, true), square(0.0, 0, false));
-        let pairs = matching::pair(0, &slave, &master).expect("they match");
+        let pairs = matching::pair(0, &slave, &master).expect("they match").pairs;
         let pairs = conditions(&slave, pairs, |pair, along| distance(&slave, &master, pair, along));
         assert_eq!(pairs.len(), 9);
         let mut forces = [[0.0; 9]; 2];
         for pair in &pairs {
             assert!(pair.area > 0.0);
-            forces[0][(pair.slave - 100) as usize] += pair.area;
-            pair.others.iter().for_each(|(node, weight)| forces[0][(node - 100) as usize] += weight * pair.area);
+            pair.slaves.iter().for_each(|(node, weight)| forces[0][(node - 100) as usize] += weight * pair.area);
             pair.masters.iter().for_each(|(node, weight)| forces[1][*node as usize] += weight * pair.area);
-            // All jumps equal to the gap are where contact closes.
-            let sum: f64 = 1.0 + pair.others.iter().map(|(_, weight)| weight).sum::<f64>();
-            assert!((pair.gap - 0.3 * sum).abs() < 1e-15, "{pair:?}");
+            for weights in [&pair.slaves, &pair.masters] {
+                assert!((weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs() < 1e-15, "{pair:?}");
+            }
+            assert!((pair.gap - 0.3).abs() < 1e-15, "{pair:?}");
         }
         let mut expected = [0.0; 9];
         for face in &master.quadratic {
@@ -125,7 +128,7 @@ mod tests {
     #[test]
     fn middles_beside_a_corner_without_condition_have_none() {
         let (slave, master) = (square(0.3, 100, true), square(0.0, 0, false));
-        let mut pairs = matching::pair(0, &slave, &master).expect("they match");
+        let mut pairs = matching::pair(0, &slave, &master).expect("they match").pairs;
         pairs.retain(|pair| pair.slave != 100);
         let left = conditions(&slave, pairs, |pair, along| distance(&slave, &master, pair, along));
         assert_eq!(left.iter().map(|pair| pair.slave).collect::<Vec<_>>(), [102, 105, 106, 107, 108]);

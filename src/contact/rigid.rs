@@ -6,7 +6,8 @@
 //! it touches at the foot of the vertical (to first order in the distance the same).
 //!
 //! A node whose surface looks away from the obstacle (`n` against its outward normal) cannot touch it from its own side and
-//! carries no condition, nor does a node beside a height field.
+//! carries no condition, nor does a node beside a height field. Where the surface has an edge, both sides of it may face the
+//! obstacle: a node there has one condition, on the area of both.
 
 use super::surface::{GatheredSurface, difference, dot, unit};
 use super::{ContactError, ContactPair};
@@ -28,19 +29,26 @@ const BESIDE: f64 = 1e-9;
 pub fn pair(
     contact: usize,
     name: &str,
-    slave: &GatheredSurface,
+    surface: &GatheredSurface,
     obstacle: &Obstacle,
 ) -> Result<Vec<ContactPair>, ContactError> {
-    let nodes = slave.nodes.iter().zip(&slave.points).zip(slave.normals_and_areas());
-    let pairs: Vec<_> = nodes
-        .filter_map(|((&slave, &point), (outward, area))| {
-            let (normal, gap) = approach(obstacle, point, outward)?;
-            let pair = ContactPair { contact, slave, others: Vec::new(), masters: Vec::new(), normal, gap, area };
-            (dot(normal, outward) > FACING).then_some(pair)
-        })
-        .collect();
+    let nodes = surface.nodes.iter().zip(&surface.points).zip(surface.normals_and_areas());
+    let mut pairs: Vec<ContactPair> = Vec::new();
+    for (((&slave, &point), (outward, area)), &part) in nodes.zip(&surface.parts) {
+        let Some((normal, gap)) = approach(obstacle, point, outward) else { continue };
+        if dot(normal, outward) <= FACING {
+            continue;
+        }
+        match pairs.last_mut().filter(|last| last.slave == slave && last.normal == normal) {
+            Some(last) => last.area += area,
+            None => {
+                let (slaves, masters) = (vec![(slave, 1.0)], Vec::new());
+                pairs.push(ContactPair { contact, slave, part, slaves, masters, normal, gap, area, covered: true });
+            }
+        }
+    }
     if pairs.is_empty() {
-        return Err(ContactError::LooksAway { name: name.to_owned(), slaves: slave.nodes.len() });
+        return Err(ContactError::LooksAway { name: name.to_owned(), slaves: surface.nodes.chunk_by(u64::eq).count() });
     }
     Ok(pairs)
 }
@@ -177,18 +185,19 @@ mod tests {
     #[test]
     fn only_nodes_that_face_the_obstacle_are_paired() {
         // A roof: one slope looks to +x, one to -x.
-        let roof = GatheredSurface {
-            nodes: vec![4, 5, 6, 7],
-            points: vec![[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 0.0]],
-            triangles: vec![[0, 1, 2], [3, 2, 1]],
-            share: 1.0,
-            quadratic: Vec::new(),
-        };
+        let points = [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 0.0]];
+        let roof = GatheredSurface::new(&[vec![4, 5, 6], vec![7, 6, 5]], &(4..).zip(points).collect());
         let wall = |x: f64, normal: f64| Obstacle::Plane { point: [x, 0.0, 0.0], normal: [normal, 0.0, 0.0] };
         let right = pair(2, "wall", &roof, &wall(3.0, -1.0)).expect("one slope faces it");
-        assert_eq!(right.iter().map(|p| (p.contact, p.slave, p.gap)).collect::<Vec<_>>(), [(2, 7, 2.0)]);
-        let area = right[0].area;
-        assert!((area - 2.0_f64.sqrt() / 6.0).abs() < 1e-15, "{area}");
+        let found = right.iter().map(|p| (p.contact, p.slave, p.gap)).collect::<Vec<_>>();
+        assert_eq!(found, [(2, 5, 3.0), (2, 6, 3.0), (2, 7, 2.0)]);
+        assert!(right.iter().all(|p| (p.area - 2.0_f64.sqrt() / 6.0).abs() < 1e-15), "{right:?}");
+        // From above both slopes face it: nodes of the ridge have one condition, on both.
+        let lid = Obstacle::Plane { point: [0.0, 0.0, 3.0], normal: [0.0, 0.0, -1.0] };
+        let above = pair(2, "lid", &roof, &lid).expect("both slopes face it");
+        let found = above.iter().map(|p| (p.slave, p.gap)).collect::<Vec<_>>();
+        assert_eq!(found, [(4, 3.0), (5, 2.0), (6, 2.0), (7, 3.0)]);
+        assert!((above[1].area - 2.0_f64.sqrt() / 3.0).abs() < 1e-15, "{above:?}");
         let floor = Obstacle::Plane { point: [0.0; 3], normal: UP };
         let error = pair(2, "floor", &roof, &floor).unwrap_err();
         assert_eq!(error, ContactError::LooksAway { name: "floor".into(), slaves: 4 });

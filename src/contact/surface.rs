@@ -1,16 +1,20 @@
 //! A named surface, gathered from all subdomains.
+//!
+//! A node where the surface bends is there once for each smooth part around it ([`smooth`]), with the normal of that part.
 
 use std::collections::BTreeMap;
 
-use super::quadratic;
+use super::{quadratic, smooth};
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Subdomain;
 use crate::mesh::surface::area_vector;
 
 /// Triangles and nodes of a surface, the same on every rank.
 pub struct GatheredSurface {
-    /// Global node numbers, ascending.
+    /// Global node numbers, ascending; those with several parts several times.
     pub nodes: Vec<u64>,
+    /// Number of the smooth part around each.
+    pub parts: Vec<u32>,
     /// Their coordinates.
     pub points: Vec<[f64; 3]>,
     /// Corners as indices into `nodes`, counter-clockwise from outside. Quadrilaterals are cut in both ways, and integrals
@@ -35,8 +39,7 @@ impl GatheredSurface {
                 }
             }
         }
-        let (mut places, mut triangles, mut quadratic) = (BTreeMap::new(), Vec::new(), Vec::new());
-        let mut share = 1.0;
+        let (mut places, mut faces) = (BTreeMap::new(), Vec::new());
         let mut all = all_gather_u64(comm, &mine).into_iter();
         while let Some(count) = all.next() {
             let mut corner = || {
@@ -44,9 +47,23 @@ impl GatheredSurface {
                 places.insert(node, [x, y, z].map(f64::from_bits));
                 node
             };
-            let face: Vec<u64> = (0..count).map(|_| corner()).collect();
+            faces.push((0..count).map(|_| corner()).collect());
+        }
+        Self::new(&faces, &places)
+    }
+
+    /// Of faces by their nodes, which have these places.
+    pub fn new(faces: &[Vec<u64>], places: &BTreeMap<u64, [f64; 3]>) -> Self {
+        let parts = smooth::parts(faces, |node| places[&node]);
+        let slots = faces.iter().zip(&parts).map(|(face, parts)| face.iter().copied().zip(parts.iter().copied()));
+        let mut listed: Vec<(u64, u32)> = slots.clone().flatten().collect();
+        listed.sort_unstable();
+        listed.dedup();
+        let (mut triangles, mut quadratic, mut share) = (Vec::new(), Vec::new(), 1.0);
+        for slots in slots {
+            let index = |slot| listed.binary_search(&slot).expect("every corner is listed");
             // All faces of a surface are of one kind.
-            match face[..] {
+            match slots.map(index).collect::<Vec<usize>>()[..] {
                 [a, b, c, d] => {
                     triangles.extend([[a, b, c], [a, c, d], [a, b, d], [b, c, d]]);
                     share = 0.5;
@@ -55,14 +72,12 @@ impl GatheredSurface {
                     triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
                     quadratic.push([a, b, c, ab, bc, ca]);
                 }
-                _ => triangles.push([face[0], face[1], face[2]]),
+                ref face => triangles.push([face[0], face[1], face[2]]),
             }
         }
-        let (nodes, points): (Vec<u64>, Vec<[f64; 3]>) = places.into_iter().unzip();
-        let index = |node: u64| nodes.binary_search(&node).expect("every corner is listed");
-        let triangles = triangles.into_iter().map(|triangle| triangle.map(index)).collect();
-        let quadratic = quadratic.into_iter().map(|face: [u64; 6]| face.map(index)).collect();
-        Self { nodes, points, triangles, share, quadratic }
+        let (nodes, parts): (Vec<u64>, Vec<u32>) = listed.into_iter().unzip();
+        let points = nodes.iter().map(|node| places[node]).collect();
+        Self { nodes, parts, points, triangles, share, quadratic }
     }
 
     /// Corners of the triangles.
@@ -104,9 +119,23 @@ impl GatheredSurface {
         };
         let mut all: Vec<_> = sums.into_iter().map(parts).collect();
         if !self.quadratic.is_empty() {
-            all.iter_mut().zip(quadratic::areas(self)).for_each(|((_, sum), area)| *sum = area);
+            all.iter_mut().zip(quadratic::areas(self, |_| true)).for_each(|((_, sum), area)| *sum = area);
         }
         all
+    }
+
+    /// As [`Self::normals_and_areas`], but of the faces alone whose nodes are all `covered`.
+    pub fn covered_areas(&self, normals: &[[f64; 3]], covered: impl Fn(usize) -> bool) -> Vec<f64> {
+        if !self.quadratic.is_empty() {
+            return quadratic::areas(self, |face| face.iter().all(|&node| covered(node)));
+        }
+        let mut areas = vec![0.0; self.nodes.len()];
+        for (triangle, vector) in self.triangles.iter().zip(self.area_vectors()) {
+            if triangle.iter().all(|&node| covered(node)) {
+                triangle.iter().for_each(|&node| areas[node] += self.share * dot(vector, normals[node]) / 3.0);
+            }
+        }
+        areas
     }
 
     /// Typical edge length: root of twice the mean triangle area.
@@ -115,6 +144,9 @@ impl GatheredSurface {
         (2.0 * total / self.triangles.len().max(1) as f64).sqrt()
     }
 }
+
+/// Cosine between the normals, one of them turned around, from which two surfaces face each other.
+pub const FACING: f64 = 0.1;
 
 /// `a - b`.
 pub fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -189,20 +221,27 @@ mod tests {
     }
 
     #[test]
-    fn at_an_edge_the_normal_is_the_mean_weighted_by_area() {
-        let roof = GatheredSurface {
-            nodes: vec![0, 1, 2, 3],
-            points: vec![[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
-            triangles: vec![[0, 2, 1], [0, 1, 3]],
-            share: 1.0,
-            quadratic: Vec::new(),
+    fn where_it_bends_a_little_the_normal_is_the_mean_weighted_by_area_and_at_an_edge_there_are_two() {
+        let bent = |drop: f64| {
+            let points = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [-1.0, 0.0, -drop]];
+            let places = (0..).zip(points).collect();
+            GatheredSurface::new(&[vec![0, 2, 1], vec![0, 1, 3]], &places)
         };
-        let [(ridge, area), _, (slope, third), _] = roof.normals_and_areas()[..] else { panic!("four nodes") };
-        let length = 5.0_f64.sqrt();
-        let expected = [-1.0 / length, 0.0, 2.0 / length];
-        assert!((0..3).all(|a| (ridge[a].abs() - expected[a].abs()).abs() < 1e-15));
-        // Triangles of areas 1 and 1/2, at right angles.
-        assert!((area - 1.25_f64.sqrt() / 3.0).abs() < 1e-15 && (third - 1.0 / 3.0).abs() < 1e-15);
+        let little = bent(0.5);
+        let [(ridge, area), _, (slope, third), _] = little.normals_and_areas()[..] else { panic!("four nodes") };
+        // Triangles of area vectors (0, 0, 1) and (-1/4, 0, 1/2).
+        let length = (1.5_f64.powi(2) + 0.25 * 0.25).sqrt();
+        let expected = [-0.25 / length, 0.0, 1.5 / length];
+        assert!((0..3).all(|a| (ridge[a] - expected[a]).abs() < 1e-15), "{ridge:?}");
+        assert!((area - length / 3.0).abs() < 1e-15 && (third - 1.0 / 3.0).abs() < 1e-15);
         assert_eq!(slope, [0.0, 0.0, 1.0]);
+        let edge = bent(3.0);
+        assert_eq!(edge.nodes, [0, 0, 1, 1, 2, 3]);
+        assert_eq!(edge.parts, [0, 1, 0, 1, 0, 0]);
+        let steep = [-3.0 / 10.0_f64.sqrt(), 0.0, 1.0 / 10.0_f64.sqrt()];
+        let expected = [[0.0, 0.0, 1.0], steep, [0.0, 0.0, 1.0], steep, [0.0, 0.0, 1.0], steep];
+        for ((normal, _), expected) in edge.normals_and_areas().iter().zip(expected) {
+            assert!((0..3).all(|a| (normal[a] - expected[a]).abs() < 1e-15), "{normal:?} {expected:?}");
+        }
     }
 }

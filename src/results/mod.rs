@@ -7,6 +7,7 @@
 
 pub mod agree;
 pub mod checkpoint;
+pub mod contact;
 pub mod fields;
 pub mod hdf5;
 pub mod piece;

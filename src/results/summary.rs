@@ -101,9 +101,9 @@ pub struct State {
     pub plastic_elements: Option<u64>,
     /// Contact pairs that transmit pressure.
     pub active_contacts: Option<u64>,
-    /// Force on the slave surfaces of all contacts together.
+    /// Sum of `contact_forces`.
     pub contact_force: Option<[f64; 3]>,
-    /// Force on the slave surface of each contact.
+    /// Force of each contact on the body that the scene names first, whichever surface is the slave.
     pub contact_forces: BTreeMap<String, [f64; 3]>,
     /// Force of each support on the bodies.
     pub reactions: BTreeMap<String, [f64; 3]>,

@@ -22,6 +22,7 @@ use super::{Discrete, Standing};
 use crate::assembly::flow::Flow;
 use crate::comm::Comm;
 use crate::constraint::{Kind, Row};
+use crate::contact::ContactPair;
 use crate::feti::Torn;
 use crate::feti::cholesky::Precision;
 use crate::feti::space::RowSpace;
@@ -172,7 +173,7 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
     let last_lambda = last.map_or_else(|| vec![0.0; lambda.len()], |last| last.lambda);
     let kept = kept.unwrap_or_else(|| vec![false; lambda.len()]);
     let owned: Vec<usize> = space.owned().iter().flatten().map(|&row| row as usize).collect();
-    let contacts: Vec<(usize, [i64; 2])> =
+    let contacts: Vec<(usize, [i64; 3])> =
         owned.iter().filter_map(|&row| Some((row, contact(discrete, row)?))).collect();
     let force = |row: usize| constraints.rows[row].scale * last_lambda[row];
     let nodes = subdomains.iter().flat_map(|s| &s.nodes).map(|&node| node as i64).collect();
@@ -195,7 +196,7 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         vector("points/factor", displacements(&factor, zero())),
         vector("points/interior", displacements(&interior, zero())),
         Field::of("cells/nodes", 4, Values::Integer(elements.collect())),
-        Field::of("contacts/key", 2, Values::Integer(contacts.iter().flat_map(|(_, key)| *key).collect())),
+        Field::of("contacts/condition", 3, Values::Integer(contacts.iter().flat_map(|(_, key)| *key).collect())),
         Field::integer("contacts/kept", contacts.iter().map(|(row, _)| i64::from(kept[*row])).collect()),
         Field::scalar("contacts/last_force", contacts.iter().map(|(row, _)| force(*row)).collect()),
         Field::integer("rows/node", owned.iter().map(|&row| lowest_node(&constraints.rows[row]) as i64).collect()),
@@ -231,10 +232,12 @@ fn vector(name: &str, values: Vec<f64>) -> Field {
     Field::of(name, 3, Values::Real(values))
 }
 
-/// What tells a row of a contact from others, however bodies are cut: the number of the contact, and the slave node.
-fn contact(Discrete { constraints, pairs, .. }: &Discrete, row: usize) -> Option<[i64; 2]> {
+/// What tells a row of a contact from others, however bodies are cut: the number of the contact, the slave node, and the smooth
+/// part of the surface around it.
+fn contact(Discrete { constraints, pairs, .. }: &Discrete, row: usize) -> Option<[i64; 3]> {
     let Kind::Contact { pair } = constraints.rows[row].kind else { return None };
-    Some([pairs[pair].contact as i64, pairs[pair].slave as i64])
+    let ContactPair { contact, slave, part, .. } = pairs[pair];
+    Some([contact as i64, slave as i64, i64::from(part)])
 }
 
 fn code(basis: &Option<Basis>) -> i64 {

@@ -2,16 +2,17 @@
 
 use super::StudyError;
 use super::conditions::{self, RightHandSides};
-use super::contacts;
+use super::contacts::{self, Contacts};
 use crate::assembly::loads::Load;
 use crate::bodies::Meshes;
 use crate::comm::Comm;
 use crate::constraint::{Constraints, Support};
-use crate::contact::ContactPair;
+use crate::contact::{ContactPair, MasterNode};
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
 use crate::material::Material;
 use crate::mesh::Face;
 use crate::monitor::timing::peak_rss_mb;
+use crate::results::contact::Touching;
 use crate::results::summary::ContactRow;
 use crate::scene::{self, Scene, SurfaceName};
 
@@ -31,6 +32,8 @@ pub struct Discrete {
     pub contact_rows: Vec<ContactRow>,
     /// All contact pairs of the scene.
     pub pairs: Vec<ContactPair>,
+    /// Nodes of all master surfaces that have slaves opposite.
+    pub masters: Vec<MasterNode>,
     /// Supports, in the order of their names.
     pub supports: Vec<Support>,
     /// Loads, in the order of their names.
@@ -45,6 +48,13 @@ pub struct Discrete {
     pub right_hand_sides: RightHandSides,
     /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
     pub reading_mb: Option<f64>,
+}
+
+impl Discrete {
+    /// Its contacts, for results.
+    pub(super) fn touching(&self) -> Touching<'_> {
+        Touching { names: &self.contacts, pairs: &self.pairs, masters: &self.masters }
+    }
 }
 
 /// Discretises a scene. Collective.
@@ -103,7 +113,7 @@ pub fn discretise_expecting(
             displacement: s.displacement.unwrap_or_default(),
         })
         .collect();
-    let (pairs, contact_rows) = contacts::pair(scene, comm, &decomposition, &supports, index)?;
+    let Contacts { pairs, masters, rows: contact_rows } = contacts::pair(scene, comm, &decomposition, &supports, index)?;
     let load = |load: &scene::Load| match load {
         scene::Load::Traction { surface, traction } => Load::Traction { surface: index(surface), value: *traction },
         scene::Load::Pressure { surface, pressure } => Load::Pressure { surface: index(surface), value: *pressure },
@@ -129,6 +139,7 @@ pub fn discretise_expecting(
         contacts,
         contact_rows,
         pairs,
+        masters,
         supports,
         loads,
         constraints,

@@ -4,11 +4,10 @@ use super::discrete::Discrete;
 use super::sizes::sizes;
 use crate::comm::Comm;
 use crate::constraint::Kind;
-use crate::contact::ContactPair;
 use crate::newton::equilibrium::Unheld;
 use crate::newton::loading::{At, Followed};
 use crate::newton::{self, Solution, StepRecord, TornProblem};
-use crate::results::fields::ContactState;
+use crate::results::contact::ContactState;
 use crate::results::summary::{self, Counters, NewtonRow, Residuals, State, StepRow, Summary};
 use crate::scene::{self, Scene};
 
@@ -67,7 +66,7 @@ pub(super) fn step_row(
         time: at.time(),
         halvings: at.halvings as u64,
         converged: solution.outcome == newton::Outcome::Converged,
-        state: state(discrete, problem, solution, contact, von_mises),
+        state: state(scene, discrete, problem, solution, contact, von_mises),
     }
 }
 
@@ -120,12 +119,12 @@ pub(super) fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
 }
 
 /// Contact of every pair whose row is on this rank.
-pub(super) fn contact_states(problem: &TornProblem, pairs: &[ContactPair], solution: &Solution) -> Vec<ContactState> {
+pub(super) fn contact_states(problem: &TornProblem, solution: &Solution) -> Vec<ContactState> {
     let slack = problem.slack(&solution.u);
     let rows = problem.constraints.rows.iter().zip(&slack).zip(&solution.lambda);
     rows.filter_map(|((row, slack), lambda)| {
         let Kind::Contact { pair } = row.kind else { return None };
-        Some(ContactState { pair, force: row.scale * lambda, gap: slack / (row.scale * pairs[pair].factor()) })
+        Some(ContactState { pair, force: row.scale * lambda, gap: slack / row.scale })
     })
     .collect()
 }
@@ -176,6 +175,7 @@ pub(super) fn summarise(
 
 /// What a solution is like. Collective.
 fn state(
+    scene: &Scene,
     discrete: &Discrete,
     problem: &TornProblem,
     solution: &Solution,
@@ -183,7 +183,7 @@ fn state(
     von_mises: f64,
 ) -> State {
     let reactions = problem.reactions(&solution.u, &solution.lambda, discrete.supports.len());
-    let contact_forces = contact_forces(problem, discrete, contact);
+    let contact_forces = contact_forces(scene, problem, discrete, contact);
     let names = discrete.supports.iter().map(|s| s.name.clone());
     let maximum = |x: f64| problem.space.maximum(x);
     State {
@@ -240,9 +240,19 @@ fn qp_name(scene: &Scene, has_inequalities: bool) -> &'static str {
     }
 }
 
-/// Force that the other side exerts on the slave surface of each contact.
-fn contact_forces(problem: &TornProblem, discrete: &Discrete, contact: &[ContactState]) -> Vec<[f64; 3]> {
-    let Discrete { contacts, pairs, .. } = discrete;
+/// Force of each contact on the surface that the scene names first.
+fn contact_forces(
+    scene: &Scene,
+    problem: &TornProblem,
+    discrete: &Discrete,
+    contact: &[ContactState],
+) -> Vec<[f64; 3]> {
+    let Discrete { contacts, pairs, contact_rows, .. } = discrete;
+    let is_slave = |(contact, row): (&scene::Contact, &summary::ContactRow)| {
+        contact.surfaces().next().is_some_and(|first| first.to_string() == row.slave)
+    };
+    let signs = scene.contact.values().zip(contact_rows).map(|of| if is_slave(of) { 1.0 } else { -1.0 });
+    let signs: Vec<f64> = signs.collect();
     let mut of_pair = vec![None; pairs.len()];
     contact.iter().for_each(|state| of_pair[state.pair] = Some(state.force));
     let mut partial = Vec::new();
@@ -250,8 +260,9 @@ fn contact_forces(problem: &TornProblem, discrete: &Discrete, contact: &[Contact
         let mut sums = vec![[0.0; 3]; contacts.len()];
         for &row in rows {
             if let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind {
+                let contact = pairs[pair].contact;
                 let force = pairs[pair].force(of_pair[pair].unwrap_or_default());
-                sums[pairs[pair].contact].iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
+                sums[contact].iter_mut().zip(force).for_each(|(sum, f)| *sum += signs[contact] * f);
             }
         }
         partial.extend_from_slice(sums.as_flattened());

@@ -34,9 +34,9 @@ pub(super) fn read(
     agree(comm, "the arrays", if whole { Ok(()) } else { Err("nodes or elements are missing") })?;
     let torn = |name: &str| places.at_nodes(arrays, &points, (name, 3, 0));
 
-    let of_contacts: HashMap<[i64; 2], usize> =
+    let of_contacts: HashMap<[i64; 3], usize> =
         (0..rows.len()).filter_map(|row| Some((contact(discrete, row)?, row))).collect();
-    let contacts = Wanted::find(arrays, "contacts/key", |key| of_contacts.get(&key).copied())?;
+    let contacts = Wanted::find(arrays, "contacts/condition", |key| of_contacts.get(&key).copied())?;
     let mut kept: Vec<bool> = rows.iter().map(|row| !row.is_inequality()).collect();
     let mut last_lambda = vec![0.0; rows.len()];
     let states = contacts.read::<i64>(arrays, "contacts/kept", 0)?;
