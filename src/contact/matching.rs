@@ -140,7 +140,8 @@ mod tests {
     #[test]
     fn matching_squares_pair_with_gap_normal_and_area() {
         for gap in [0.0, 0.3, 7.0, -0.2] {
-            let pairs = pair(0, &square(4, 1.0, gap, false, 100), &square(4, 1.0, 0.0, true, 0)).expect("they match").pairs;
+            let pairs =
+                pair(0, &square(4, 1.0, gap, false, 100), &square(4, 1.0, 0.0, true, 0)).expect("they match").pairs;
             assert_eq!(pairs.len(), 25);
             for p in &pairs {
                 assert_eq!(p.masters, [(p.slave - 100, 1.0)]);

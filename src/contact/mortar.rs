@@ -246,12 +246,7 @@ fn is_held(normal: [f64; 3], held: [bool; 3]) -> bool {
 }
 
 /// Adds what one face gives to the sums of its active corners.
-fn add(
-    sums: &mut BTreeMap<usize, Sums>,
-    part: &Part,
-    active: &[bool],
-    master: &GatheredSurface,
-) {
+fn add(sums: &mut BTreeMap<usize, Sums>, part: &Part, active: &[bool], master: &GatheredSurface) {
     let Part { face, seen, cosines, .. } = part;
     let active = [0, 1, 2].map(|k| active[face[k]]);
     if !active.contains(&true) {
@@ -271,7 +266,9 @@ fn add(
                 *of_node.masters.entry(master.nodes[*node]).or_default() += psi * value;
             }
             if face.len() > 3 {
-                functions(face, *at).into_iter().for_each(|(k, value)| *of_node.slaves.entry(k).or_default() += psi * value);
+                functions(face, *at)
+                    .into_iter()
+                    .for_each(|(k, value)| *of_node.slaves.entry(k).or_default() += psi * value);
             }
         }
         let whole: f64 = integrals[j].iter().sum();

@@ -98,7 +98,12 @@ mod tests {
         // The two nodes in common, second and third of the one, first and fourth of the other.
         assert_eq!(cut, [[0, 0, 0, 0], [1, 0, 0, 1]]);
         // A chain of small angles is smooth, however far it leads.
-        let chain: Vec<f64> = (0..8).scan(0.0, |z, k| { *z += up(10.0 * f64::from(k)); Some(*z) }).collect();
+        let chain: Vec<f64> = (0..8)
+            .scan(0.0, |z, k| {
+                *z += up(10.0 * f64::from(k));
+                Some(*z)
+            })
+            .collect();
         assert!(of_strip(&chain).iter().flatten().all(|part| *part == 0));
     }
 

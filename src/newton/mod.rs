@@ -5,6 +5,7 @@
 //! ([`crate::assembly::flow`]), that steps are seldom damped. [`step`] is the only place where
 //! FETI and the QP solvers meet.
 
+pub mod balance;
 pub mod basis;
 pub mod certificate;
 pub mod committed;

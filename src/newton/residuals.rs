@@ -93,7 +93,7 @@ impl TornProblem<'_> {
     }
 
     /// `f - F(u) - B_I'lambda_I`, torn: after adding up copies, minus the reactions.
-    fn unbalanced(&self, state: &State, lambda: &[f64]) -> Torn {
+    pub(super) fn unbalanced(&self, state: &State, lambda: &[f64]) -> Torn {
         let contact: Vec<f64> = self
             .constraints
             .rows
@@ -107,8 +107,7 @@ impl TornProblem<'_> {
     }
 
     /// Force of each support on the bodies, `[support][component]`. Collective.
-    pub fn reactions(&self, u: &Torn, lambda: &[f64], supports: usize) -> Vec<[f64; 3]> {
-        let state = &self.evaluate(u);
+    pub fn reactions(&self, state: &State, lambda: &[f64], supports: usize) -> Vec<[f64; 3]> {
         let mut rows = vec![0.0; self.gather.rows()];
         self.gather.apply(&self.unbalanced(state, lambda), &mut rows);
         let mut partial = vec![0.0; 3 * supports * self.space.owned().len()];

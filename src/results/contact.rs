@@ -121,7 +121,8 @@ impl AtNodes {
     /// Where contact of a quadratic face has conditions at its corners only, its fields are linear: middles have the means.
     fn fill_middles(&mut self, subdomain: &Subdomain) {
         let quadratic = subdomain.facets.iter().filter(|facet| facet.nodes.len() == 6);
-        let edges = quadratic.flat_map(|facet| (0..3).map(|k| [3 + k, k, (k + 1) % 3].map(|n| facet.nodes[n] as usize)));
+        let edges =
+            quadratic.flat_map(|facet| (0..3).map(|k| [3 + k, k, (k + 1) % 3].map(|n| facet.nodes[n] as usize)));
         for [middle, a, b] in edges {
             if self.status[middle] < 0 && self.status[a] >= 0 && self.status[b] >= 0 {
                 self.pressure[middle] = 0.5 * (self.pressure[a] + self.pressure[b]);

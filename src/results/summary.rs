@@ -107,6 +107,8 @@ pub struct State {
     pub contact_forces: BTreeMap<String, [f64; 3]>,
     /// Force of each support on the bodies.
     pub reactions: BTreeMap<String, [f64; 3]>,
+    /// What acts on each body.
+    pub balance: BTreeMap<String, Acting>,
     /// Work of the loads, `f'u`.
     pub external_work: Option<f64>,
     /// `Psi(u)`.
@@ -123,6 +125,29 @@ pub struct State {
     /// How far the stress is from what it should be.
     #[serde(flatten)]
     pub errors: Errors,
+}
+
+/// Forces and moments on a body, these about the mean of its nodes. What supports hold of a contact's condition passes from one
+/// to the other and is in neither.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Acting {
+    /// Of loads.
+    pub loads: Resultant,
+    /// Of supports.
+    pub supports: Resultant,
+    /// Of contacts.
+    pub contacts: Resultant,
+    /// Their sum, zero in equilibrium.
+    pub unbalanced: Resultant,
+}
+
+/// A force and its moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Resultant {
+    /// The force.
+    pub force: [f64; 3],
+    /// The moment (force times length).
+    pub moment: [f64; 3],
 }
 
 /// Errors of the stress in the norm of its complementary energy, relative to the stress.
@@ -237,6 +262,9 @@ pub struct Residuals {
     /// Pressure across open gaps.
     #[serde(rename = "residual_complementarity")]
     pub complementarity: Option<f64>,
+    /// Unbalanced force or moment of a body.
+    #[serde(rename = "residual_balance")]
+    pub balance: Option<f64>,
 }
 
 /// What the solution on a coarser level took.

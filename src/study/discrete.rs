@@ -113,7 +113,8 @@ pub fn discretise_expecting(
             displacement: s.displacement.unwrap_or_default(),
         })
         .collect();
-    let Contacts { pairs, masters, rows: contact_rows } = contacts::pair(scene, comm, &decomposition, &supports, index)?;
+    let Contacts { pairs, masters, rows: contact_rows } =
+        contacts::pair(scene, comm, &decomposition, &supports, index)?;
     let load = |load: &scene::Load| match load {
         scene::Load::Traction { surface, traction } => Load::Traction { surface: index(surface), value: *traction },
         scene::Load::Pressure { surface, pressure } => Load::Pressure { surface: index(surface), value: *pressure },

@@ -4,6 +4,7 @@ use super::discrete::Discrete;
 use super::sizes::sizes;
 use crate::comm::Comm;
 use crate::constraint::Kind;
+use crate::newton::balance::{BodyBalance, Resultant};
 use crate::newton::equilibrium::Unheld;
 use crate::newton::loading::{At, Followed};
 use crate::newton::{self, Solution, StepRecord, TornProblem};
@@ -182,7 +183,9 @@ fn state(
     contact: &[ContactState],
     von_mises: f64,
 ) -> State {
-    let reactions = problem.reactions(&solution.u, &solution.lambda, discrete.supports.len());
+    let at_end = problem.evaluate(&solution.u);
+    let reactions = problem.reactions(&at_end, &solution.lambda, discrete.supports.len());
+    let (balance, residual_balance) = problem.balance(&at_end, &solution.lambda, discrete.bodies.len());
     let contact_forces = contact_forces(scene, problem, discrete, contact);
     let names = discrete.supports.iter().map(|s| s.name.clone());
     let maximum = |x: f64| problem.space.maximum(x);
@@ -204,7 +207,9 @@ fn state(
             gluing: Some(solution.residuals.gluing),
             gap: Some(solution.residuals.gap),
             complementarity: Some(solution.residuals.complementarity),
+            balance: Some(residual_balance),
         },
+        balance: scene.body.keys().cloned().zip(balance.iter().map(acting)).collect(),
         errors: summary::Errors {
             duality_gap: solution.errors.as_ref().map(|errors| errors.gap),
             algebraic: solution.errors.as_ref().map(|errors| errors.algebraic),
@@ -212,6 +217,17 @@ fn state(
             discretisation: solution.errors.as_ref().map(|errors| errors.discretisation),
             ended_by_accuracy: Some(solution.ended_by_accuracy),
         },
+    }
+}
+
+/// What acts on a body.
+fn acting(body: &BodyBalance) -> summary::Acting {
+    let resultant = |Resultant { force, moment }| summary::Resultant { force, moment };
+    summary::Acting {
+        loads: resultant(body.loads),
+        supports: resultant(body.supports),
+        contacts: resultant(body.contacts),
+        unbalanced: resultant(body.unbalanced()),
     }
 }
 

@@ -7,6 +7,7 @@ mod benchmark;
 mod cascade;
 mod checkpoint;
 mod common;
+mod edges;
 mod elements;
 mod faults;
 mod fuzz;

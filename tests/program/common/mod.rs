@@ -47,10 +47,13 @@ impl Run {
         results.next().unwrap_or_else(|| panic!("no result file; exit code {}: {}", self.code, self.stderr))
     }
 
-    /// Passes on a run that converged.
+    /// Passes on a run that converged: then forces and moments on each body are in balance, to the size of the residual.
     pub fn converged(self) -> Run {
         assert_eq!(self.code, 0, "{}{}", self.stdout, self.stderr);
-        assert_eq!(self.summary()["converged"], true);
+        let summary = self.summary();
+        assert_eq!(summary["converged"], true);
+        let [balance, residual] = ["residual_balance", "residual_equilibrium"].map(|key| number(&summary, key));
+        assert!(balance <= 10.0 * residual + 1e-9, "{balance:.1e} is out of balance, the residual is {residual:.1e}");
         self
     }
 }

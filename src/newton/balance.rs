@@ -1,0 +1,168 @@
+//! Forces and moments on each body: what a run found must be in balance, seen from outside.
+//!
+//! Loads, reactions of supports and contact forces on a body add up to nothing, and so do their moments (about the mean of its
+//! nodes), whatever happens inside. They are summed from nodal forces: `f`, what supports take of `f - F(u) - B_I'lambda_I`,
+//! and `-B_I'lambda_I`. Where a support holds a component of a contact's condition, the support takes that part of the contact
+//! force at once: it is in neither of the two.
+
+use super::problem::{SIGNIFICANT, State, TornProblem};
+use crate::constraint::Kind;
+use crate::feti::Torn;
+
+/// A force and its moment about a point (force, force times length).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Resultant {
+    /// The force.
+    pub force: [f64; 3],
+    /// The moment.
+    pub moment: [f64; 3],
+}
+
+/// What acts on a body; moments are about the mean of its nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BodyBalance {
+    /// Loads.
+    pub loads: Resultant,
+    /// Reactions of supports.
+    pub supports: Resultant,
+    /// Contact forces.
+    pub contacts: Resultant,
+    /// Sum of the sizes of all these nodal forces.
+    pub gross: f64,
+    /// Root of the mean squared distance of the nodes from their mean (length).
+    pub radius: f64,
+}
+
+impl Resultant {
+    fn add(&mut self, force: &[f64], arm: [f64; 3]) {
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            self.force[a] += force[a];
+            self.moment[a] += arm[b] * force[c] - arm[c] * force[b];
+        }
+    }
+
+    fn of(numbers: &[f64]) -> Self {
+        Self { force: [numbers[0], numbers[1], numbers[2]], moment: [numbers[3], numbers[4], numbers[5]] }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        let sum = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|i| a[i] + b[i]);
+        Self { force: sum(self.force, other.force), moment: sum(self.moment, other.moment) }
+    }
+}
+
+impl BodyBalance {
+    /// What is left of all that acts on the body.
+    pub fn unbalanced(&self) -> Resultant {
+        self.loads.plus(self.supports).plus(self.contacts)
+    }
+}
+
+/// The largest unbalanced force of a body over the largest sum of nodal forces on one, or moment over that at the radius of the
+/// body; `least` is what forces are compared with at least.
+pub fn relative(bodies: &[BodyBalance], least: f64) -> f64 {
+    let size = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let scale = bodies.iter().fold(least, |largest, body| largest.max(body.gross));
+    let of_body = |body: &BodyBalance| {
+        let left = body.unbalanced();
+        [size(left.force), size(left.moment) / body.radius]
+    };
+    let worst = bodies.iter().flat_map(of_body).fold(0.0, |a: f64, b| if b.is_nan() || b > a { b } else { a });
+    if worst == 0.0 { 0.0 } else { worst / scale }
+}
+
+/// Numbers of a body in the sums: three resultants, the size of all forces, the square of all arms.
+const NUMBERS: usize = 20;
+
+impl TornProblem<'_> {
+    /// What acts on each of so many bodies, and the largest imbalance, relative. Two collectives and a neighbour exchange.
+    pub fn balance(&self, state: &State, lambda: &[f64], bodies: usize) -> (Vec<BodyBalance>, f64) {
+        let contacts = self.contact_forces(lambda);
+        let supports = self.support_forces(state, lambda);
+        let centres = self.centres(bodies);
+        let mut partial = vec![0.0; NUMBERS * bodies * self.subdomains.len()];
+        for (own, sums) in partial.chunks_exact_mut((NUMBERS * bodies).max(1)).enumerate() {
+            let subdomain = &self.subdomains[own];
+            let sums = &mut sums[NUMBERS * subdomain.body..][..NUMBERS];
+            let mut resultants = [Resultant::default(); 3];
+            for (node, point) in subdomain.points.iter().enumerate() {
+                let arm = std::array::from_fn(|a| point[a] - centres[subdomain.body].1[a]);
+                for (resultant, forces) in resultants.iter_mut().zip([&self.loads, &supports, &contacts]) {
+                    let force = &forces[own][3 * node..][..3];
+                    resultant.add(force, arm);
+                    sums[18] += force.iter().map(|f| f * f).sum::<f64>().sqrt();
+                }
+                sums[19] += arm.iter().map(|a| a * a).sum::<f64>();
+            }
+            for (numbers, Resultant { force, moment }) in sums.chunks_exact_mut(6).zip(resultants) {
+                numbers.copy_from_slice([force, moment].as_flattened());
+            }
+        }
+        let sums = self.space.sum(&partial, NUMBERS * bodies);
+        let of_body = |(numbers, (nodes, _)): (&[f64], &(f64, [f64; 3]))| BodyBalance {
+            loads: Resultant::of(&numbers[..6]),
+            supports: Resultant::of(&numbers[6..12]),
+            contacts: Resultant::of(&numbers[12..18]),
+            gross: numbers[18],
+            radius: (numbers[19] / nodes).sqrt(),
+        };
+        let found: Vec<BodyBalance> = sums.chunks_exact(NUMBERS).zip(&centres).map(of_body).collect();
+        let relative = relative(&found, SIGNIFICANT * state.terms.force_squares.sqrt());
+        (found, relative)
+    }
+
+    /// `-B_I'lambda_I`.
+    fn contact_forces(&self, lambda: &[f64]) -> Torn {
+        let rows = self.constraints.rows.iter().zip(lambda);
+        let contact: Vec<f64> = rows.map(|(row, &l)| if row.is_inequality() { l } else { 0.0 }).collect();
+        let mut forces = self.gather.zeros();
+        self.gather.add_transpose(-1.0, &contact, &mut forces);
+        forces
+    }
+
+    /// What supports take of `f - F(u) - B_I'lambda_I`, as forces on the bodies.
+    fn support_forces(&self, state: &State, lambda: &[f64]) -> Torn {
+        let mut rows = vec![0.0; self.gather.rows()];
+        self.gather.apply(&self.unbalanced(state, lambda), &mut rows);
+        for (value, row) in rows.iter_mut().zip(&self.constraints.rows) {
+            *value = if matches!(row.kind, Kind::Support { .. }) { *value / (row.length * row.length) } else { 0.0 };
+        }
+        let mut forces = self.gather.zeros();
+        self.gather.add_transpose(-1.0, &rows, &mut forces);
+        forces
+    }
+
+    /// Number of nodes of each body, copies included, and their mean.
+    fn centres(&self, bodies: usize) -> Vec<(f64, [f64; 3])> {
+        let mut partial = vec![0.0; 4 * bodies * self.subdomains.len()];
+        for (subdomain, sums) in self.subdomains.iter().zip(partial.chunks_exact_mut((4 * bodies).max(1))) {
+            let sums = &mut sums[4 * subdomain.body..][..4];
+            sums[3] = subdomain.points.len() as f64;
+            subdomain.points.iter().for_each(|point| (0..3).for_each(|a| sums[a] += point[a]));
+        }
+        let sums = self.space.sum(&partial, 4 * bodies);
+        sums.as_chunks::<4>().0.iter().map(|&[x, y, z, nodes]| (nodes, [x, y, z].map(|sum| sum / nodes))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_and_their_moments_are_compared_with_all_that_act() {
+        let mut pushed = Resultant::default();
+        pushed.add(&[0.0, 0.0, -3.0], [2.0, 0.0, 1.0]);
+        assert_eq!(pushed, Resultant { force: [0.0, 0.0, -3.0], moment: [0.0, 6.0, 0.0] });
+        let mut held = Resultant::default();
+        held.add(&[0.0, 0.0, 3.0], [0.5, 0.0, -1.0]);
+        let tips = BodyBalance { loads: pushed, supports: held, gross: 6.0, radius: 2.0, ..BodyBalance::default() };
+        // Forces are in balance, the moment 3 x 1.5 is not: over the radius and all forces.
+        assert_eq!(relative(&[tips], 0.0), 4.5 / 2.0 / 6.0);
+        assert_eq!(relative(&[tips], 60.0), 4.5 / 2.0 / 60.0);
+        let stands = BodyBalance { contacts: Resultant { moment: [0.0, -4.5, 0.0], ..Resultant::default() }, ..tips };
+        assert_eq!(relative(&[stands, BodyBalance { radius: 1.0, ..BodyBalance::default() }], 0.0), 0.0);
+        assert_eq!(relative(&[], 0.0), 0.0);
+    }
+}
