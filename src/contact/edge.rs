@@ -29,12 +29,16 @@ pub fn places(covered: &[[f64; 3]], centre: [f64; 3]) -> Option<[[f64; 3]; 3]> {
     }))
 }
 
+/// Twice the area, in shares of the triangle's, that a side of the covered part makes with a point on the wrong side of it, from
+/// which that counts. Where pieces meet, sides as long as rounding point anywhere.
+const ROUNDING: f64 = 1e-12;
+
 /// How much of the way from a point inside to another one is in a convex polygon, whose corners turn counter-clockwise.
 fn length(polygon: &[Point], from: Point, to: Point) -> f64 {
     let sides = polygon.iter().zip(polygon.iter().cycle().skip(1));
     sides.fold(1.0, |shortest: f64, (&a, &b)| {
         let (here, there) = (turn(a, b, from), turn(a, b, to));
-        if there < 0.0 { shortest.min(here.max(0.0) / (here - there)) } else { shortest }
+        if there < -ROUNDING { shortest.min(here.max(0.0) / (here.max(0.0) - there)) } else { shortest }
     })
 }
 
@@ -84,6 +88,20 @@ mod tests {
         let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         assert_eq!(places(&corners, [1.0 / 3.0; 3]), None);
         assert_eq!(places(&[corners[0], corners[1], corners[2], [0.2, 0.3, 0.5]], [0.3, 0.4, 0.3]), None);
+    }
+
+    #[test]
+    fn sides_as_long_as_rounding_do_not_count() {
+        let near = |x: f64, y: f64| [x, y, 1.0 - x - y];
+        let corners = [near(1.0, 0.0), near(0.0, 1.0), near(0.0, 0.0)];
+        let doubled = [near(1.0 - 1e-16, 1e-17), near(1e-17, 1.0 - 1e-16), near(1e-17, -1e-17), near(0.5, -1e-17)];
+        assert_eq!(places(&[&corners[..], &doubled].concat(), [1.0 / 3.0; 3]), None);
+        let mut random = Random::new(2);
+        for _ in 0..200 {
+            let mut shaken = || corners.map(|corner| corner.map(|x| x + 1e-16 * random.number()));
+            let all = [corners, shaken(), shaken(), shaken()].concat();
+            assert_eq!(places(&all, [0.2, 0.3, 0.5]), None);
+        }
     }
 
     /// Covered where the third function is at most `reach`: the place of that corner is at the edge, whatever the reach.

@@ -24,4 +24,5 @@ mod ranks;
 mod results;
 mod rigid;
 mod ring;
+mod twins;
 mod verify;
