@@ -1,5 +1,7 @@
 //! Support rows: the mean over a node's copies has a prescribed value.
 
+use std::collections::HashMap;
+
 use super::{ConstraintError, Kind, Row, Support, Term};
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::InterfaceNode;
@@ -9,20 +11,18 @@ pub(super) fn fixed(node: &InterfaceNode, supports: &[Support]) -> [Option<(usiz
     [0, 1, 2].map(|axis| at(node, supports, axis).next())
 }
 
-/// Which components supports fix at some nodes, ascending and all on named surfaces. Collective: the nodes are the same on
-/// every rank.
+/// Which components supports fix at some nodes, ascending, perhaps several times, and all on named surfaces. Collective: the
+/// nodes are the same on every rank.
 pub fn held(comm: &dyn Comm, interface: &[InterfaceNode], supports: &[Support], nodes: &[u64]) -> Vec<[bool; 3]> {
     let mut mine = Vec::new();
     for node in interface.iter().filter(|node| nodes.binary_search(&node.node).is_ok()) {
         let fixed = fixed(node, supports).map(|support| u64::from(support.is_some()));
         mine.extend([node.node, fixed[0], fixed[1], fixed[2]]);
     }
-    let mut held = vec![[false; 3]; nodes.len()];
-    for report in all_gather_u64(comm, &mine).chunks_exact(4) {
-        let at = nodes.binary_search(&report[0]).expect("it is one of the nodes");
-        held[at] = std::array::from_fn(|a| report[1 + a] == 1);
-    }
-    held
+    let all = all_gather_u64(comm, &mine);
+    let reports = all.as_chunks::<4>().0.iter().map(|&[node, x, y, z]| (node, [x, y, z].map(|fixed| fixed == 1)));
+    let held: HashMap<u64, [bool; 3]> = reports.collect();
+    nodes.iter().map(|node| held.get(node).copied().unwrap_or_default()).collect()
 }
 
 /// The supports that fix a component at a node, and their values.

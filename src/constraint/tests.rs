@@ -1,7 +1,8 @@
 use faer::Mat;
 
-use super::contact;
 use super::{ConstraintError, Constraints, Kind, Row, Support};
+use super::{contact, dirichlet};
+use crate::comm::all_gather_u64;
 use crate::contact::ContactPair;
 use crate::decomposition::{InterfaceNode, Subdomain};
 use crate::fixture::{
@@ -226,4 +227,20 @@ fn of_contacts_in_one_direction_the_tightest_counts() {
         contact::add_tightest(&mut rows, row(number, gap, normal));
     }
     assert_eq!(rows, [row(2, 0.2, up), row(1, -0.5, down), row(4, 0.1, [0.0, 0.6, 0.8])]);
+}
+
+#[test]
+fn what_supports_hold_is_told_of_every_node_that_is_asked_for() {
+    for ranks in RANKS {
+        on_ranks(&two_bricks(&[]), ranks, |setup| {
+            let (supports, decomposition) = (&setup.discrete.supports, &setup.discrete.decomposition);
+            let fixed = |node: &&InterfaceNode| dirichlet::fixed(node, supports).iter().any(Option::is_some);
+            let mine: Vec<u64> = decomposition.interface.iter().filter(fixed).map(|node| node.node).collect();
+            let some = all_gather_u64(setup.comm, &mine).into_iter().min().expect("supports hold some");
+            let found =
+                dirichlet::held(setup.comm, &decomposition.interface, supports, &[some, some, some + 1_000_000]);
+            assert_eq!(found[0], found[1]);
+            assert!(found[0] != [false; 3] && found[2] == [false; 3]);
+        });
+    }
 }

@@ -1,7 +1,8 @@
-//! Nodes that several rigid obstacles stop: their conditions must be independent.
+//! Nodes that are stopped in several directions: their conditions must be independent.
 //!
 //! A node has three components, fewer where supports hold it, and cannot meet more obstacles than that in different
-//! directions: the forces would not be unique, and the dual problem singular on any set that holds them all. Conditions
+//! directions, nor one other node in more smooth parts of its surface (the tip of a pyramid): the forces would not be unique,
+//! and the dual problem singular on any set that holds them all. Conditions
 //! of one direction are no matter, the tightest stands for all ([`crate::constraint::contact`]).
 
 use std::collections::BTreeMap;
@@ -12,7 +13,7 @@ use super::{ContactError, ContactPair};
 /// Distance of a unit vector to the others or to their span from which a direction counts as independent.
 const INDEPENDENT: f64 = 1e-6;
 
-/// Refuses obstacles that are too many for a node. `held` tells which components of some nodes supports fix; it is asked
+/// Refuses directions that are too many for a node. `held` tells which components of some nodes supports fix; it is asked
 /// at most once, with the same nodes on every rank.
 ///
 /// # Errors
@@ -22,12 +23,13 @@ pub fn check(
     pairs: &[ContactPair],
     held: impl FnOnce(&[u64]) -> Vec<[bool; 3]>,
 ) -> Result<(), ContactError> {
-    let mut stopped: BTreeMap<u64, Vec<&ContactPair>> = BTreeMap::new();
-    for pair in pairs.iter().filter(|pair| pair.masters.is_empty()) {
-        stopped.entry(pair.slave).or_default().push(pair);
+    // By what they meet: nothing but themselves, or one node.
+    let mut stopped: BTreeMap<(u64, Option<u64>), Vec<&ContactPair>> = BTreeMap::new();
+    for pair in pairs.iter().filter(|pair| pair.masters.len() <= 1) {
+        stopped.entry((pair.slave, pair.masters.first().map(|(node, _)| *node))).or_default().push(pair);
     }
     stopped.retain(|_, pairs| pairs.len() > 1);
-    let nodes: Vec<u64> = stopped.keys().copied().collect();
+    let nodes: Vec<u64> = stopped.keys().map(|(slave, _)| *slave).collect();
     if nodes.is_empty() {
         return Ok(());
     }
@@ -77,13 +79,19 @@ mod tests {
     use super::*;
 
     fn checked(normals: &[[f64; 3]], held: [bool; 3]) -> Result<(), ContactError> {
+        let alone = against(&[], normals, held);
+        assert_eq!(alone, against(&[(8, 1.0)], normals, held), "obstacles, or parts of a surface against one node");
+        alone
+    }
+
+    fn against(masters: &[(u64, f64)], normals: &[[f64; 3]], held: [bool; 3]) -> Result<(), ContactError> {
         let names: Vec<String> = (0..normals.len()).map(|k| format!("wall-{k}")).collect();
         let pair = |(contact, &normal): (usize, &[f64; 3])| ContactPair {
             contact,
             slave: 7,
             part: 0,
             slaves: vec![(7, 1.0)],
-            masters: Vec::new(),
+            masters: masters.to_vec(),
             normal: unit(normal).expect("not zero"),
             gap: 0.0,
             area: 1.0,

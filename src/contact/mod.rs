@@ -117,10 +117,11 @@ pub enum ContactError {
         /// All slave nodes.
         slaves: usize,
     },
-    /// Obstacles meet at a node in more directions than it has components.
+    /// A node is stopped in more directions than it has components.
     #[error(
-        "contact.{names}: {nodes} nodes meet these obstacles in more directions than are independent there, so the contact \
-         forces would not be unique; give each obstacle the part of the surface that it can touch"
+        "contact.{names}: {nodes} nodes are stopped in more directions than are independent there, so the contact forces would not \
+         be unique; give each obstacle the part of the surface that it can touch, and leave out a face where more than three meet \
+         at a tip"
     )]
     Crowded {
         /// Names of the contacts at the first such node.

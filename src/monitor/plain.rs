@@ -148,9 +148,9 @@ fn residual_lines(residuals: &Residuals) -> Vec<String> {
         ("gluing", residuals.gluing),
         ("gap", residuals.gap),
         ("complementarity", residuals.complementarity),
-        ("balance of bodies", residuals.balance),
+        ("balance", residuals.balance),
     ];
-    let known = rows.into_iter().filter_map(|(name, value)| value.map(|v| format!("  {name:<17}{v:>12.3e}")));
+    let known = rows.into_iter().filter_map(|(name, value)| value.map(|v| format!("  {name:<16}{v:>12.3e}")));
     ["relative residuals".to_owned()].into_iter().chain(known).collect()
 }
 
