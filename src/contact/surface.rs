@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::quadratic;
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Subdomain;
+pub use crate::mesh::near::{difference, dot};
 use crate::mesh::surface::area_vector;
 
 /// Triangles and nodes of a surface, the same on every rank.
@@ -114,16 +115,6 @@ impl GatheredSurface {
         let total: f64 = self.area_vectors().map(|v| dot(v, v).sqrt()).sum();
         (2.0 * total / self.triangles.len().max(1) as f64).sqrt()
     }
-}
-
-/// `a - b`.
-pub fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-/// `a . b`.
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The vector over its length, whatever that is.

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::io;
 
+use crate::mesh::whole::Flaw;
+
 /// What is wrong with a mesh file. Counts are of the file.
 #[derive(Debug, thiserror::Error)]
 pub enum Problem {
@@ -151,16 +153,15 @@ pub enum Problem {
         /// How many.
         cells: u64,
     },
-    /// Volumes of a body that nothing joins.
-    #[error(
-        "volume `{volume}` has no face in common with {others}: meshes of one body must meet node by node, as after \
-         `BooleanFragments` or `Coherence;`; what only touches is a body of its own, with a contact"
-    )]
-    Apart {
-        /// Name of the volume.
+    /// A mesh that only looks whole.
+    #[error("{volume}, first near ({:.6}, {:.6}, {:.6}): {flaw}", near[0], near[1], near[2])]
+    NotWhole {
+        /// Names of the volumes there.
         volume: String,
-        /// Names of others.
-        others: String,
+        /// Where it shows first, in the file's coordinates.
+        near: [f64; 3],
+        /// What is wrong.
+        flaw: Flaw,
     },
     /// Cells that cannot be computed with.
     #[error(
