@@ -13,7 +13,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use metis::Graph;
 use metis::option::{Contig, Seed};
 
-
 use super::shares::{by_cost, interleave};
 use super::{Bodies, BodyMesh, Clusters, Patch, Shape, Subdomain};
 use crate::comm::{Comm, Shares};

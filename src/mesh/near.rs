@@ -49,8 +49,7 @@ pub fn of_segments(first: &[Point; 2], second: &[Point; 2]) -> f64 {
     let ends = first.iter().map(|&p| to_segment(p, second)).chain(second.iter().map(|&p| to_segment(p, first)));
     let least = ends.fold(f64::INFINITY, f64::min);
     // Where both lines are nearest to each other, if that is within both.
-    let (u, v, w) =
-        (difference(first[1], first[0]), difference(second[1], second[0]), difference(first[0], second[0]));
+    let (u, v, w) = (difference(first[1], first[0]), difference(second[1], second[0]), difference(first[0], second[0]));
     let (a, b, c, d, e) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));
     let determinant = a * c - b * b;
     let [s, t] = [b * e - c * d, a * e - b * d].map(|x| ratio(x, determinant));
@@ -87,7 +86,8 @@ mod tests {
         for _ in 0..50 {
             let [a, b, c, p, q]: [Point; 5] = std::array::from_fn(|_| random.vector(1.0));
             let grid = shares().flat_map(|s| shares().map(move |t| (s, t * (1.0 - s))));
-            let on_triangle = |(s, t): (f64, f64)| std::array::from_fn(|i| a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i]));
+            let on_triangle =
+                |(s, t): (f64, f64)| std::array::from_fn(|i| a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i]));
             let least = grid.map(|at| of_points(on_triangle(at), p)).fold(f64::INFINITY, f64::min).sqrt();
             let found = to_triangle(p, &[a, b, c]).sqrt();
             assert!((-1e-12..3.0 / FINE as f64).contains(&(least - found)), "{found} {least}");

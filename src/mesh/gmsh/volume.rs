@@ -27,6 +27,7 @@ impl Msh {
         }
         let blocks = self.blocks_of(&volumes)?;
         let volume = &volumes.join("` + `");
+        self.refuse_repeated(&volumes, &blocks)?;
 
         let mut index = vec![u32::MAX; self.points.len()];
         blocks.iter().flat_map(|(b, _)| &b.nodes).for_each(|&n| index[n as usize] = 0);
@@ -61,8 +62,9 @@ impl Msh {
         let mut mesh = SolidMesh { points, elements, cells, surfaces: Vec::new(), regions, pieces: Vec::new() };
         check_elements(volume, &mesh)?;
         let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
-        if neighbours.overlapping > 0 {
-            return Err(Problem::Overlapping { volume: volume.clone(), faces: neighbours.overlapping });
+        if let Some(node) = neighbours.overlaps_at {
+            let (volume, faces, near) = (volume.clone(), neighbours.overlapping, mesh.points[node as usize]);
+            return Err(Problem::Overlapping { volume, faces, near });
         }
         mesh.pieces = whole::pieces(&mesh, &neighbours).map_err(|found| not_whole(&volumes, found))?;
         mesh.surfaces =
@@ -113,6 +115,21 @@ impl Msh {
             found.push((block, first));
         }
         Ok(found)
+    }
+
+    /// Refuses cells that have a node twice.
+    fn refuse_repeated(&self, volumes: &[String], blocks: &[(&Block, usize)]) -> Result<(), Problem> {
+        let (mut count, mut first) = (0, None);
+        for (block, volume) in blocks {
+            for cell in block.nodes.chunks_exact(block.kind.nodes) {
+                if let Some(&node) = (1..cell.len()).find(|&k| cell[..k].contains(&cell[k])).map(|k| &cell[k]) {
+                    count += 1;
+                    first.get_or_insert((block.kind.name, volumes[*volume].clone(), self.points[node as usize]));
+                }
+            }
+        }
+        let refused = |(kind, volume, near)| Err(Problem::Repeated { volume, cells: count, kind, near });
+        first.map_or(Ok(()), refused)
     }
 
     fn refuse_untagged(&self) -> Result<(), Problem> {
