@@ -1,7 +1,7 @@
 //! How near points, segments and triangles in space are to each other (Ericson, "Real-Time Collision Detection", 2005,
 //! chapter 5). Squares of distances, so that nothing is rooted in vain.
 
-use super::surface::area_vector;
+use super::surface::{area, area_vector};
 
 type Point = [f64; 3];
 
@@ -60,11 +60,12 @@ pub fn of_segments(first: &[Point; 2], second: &[Point; 2]) -> f64 {
     least
 }
 
-/// Whether a segment goes through the inside of a triangle.
-pub fn pierces(&[p, q]: &[Point; 2], &[a, b, c]: &[Point; 3]) -> bool {
+/// Whether a segment goes through the inside of a triangle, with ends farther than `near` from its plane.
+pub fn pierces(&[p, q]: &[Point; 2], &[a, b, c]: &[Point; 3], near: f64) -> bool {
     let sides = [[a, b], [b, c], [c, a]].map(|[from, to]| volume(p, q, from, to));
     let through = sides.iter().all(|v| *v > 0.0) || sides.iter().all(|v| *v < 0.0);
-    through && volume(a, b, c, p) * volume(a, b, c, q) < 0.0
+    let [low, high] = [p, q].map(|x| volume(a, b, c, x));
+    through && low * high < 0.0 && low.abs().min(high.abs()) > 2.0 * near * area(&[a, b, c])
 }
 
 fn ratio(x: f64, y: f64) -> f64 {
@@ -103,10 +104,10 @@ mod tests {
         let triangle = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let through = |x: f64, y: f64, low: f64, high: f64| {
             let [p, q] = [[x, y, low], [x, y, high]];
-            assert_eq!(pierces(&[p, q], &triangle), pierces(&[q, p], &triangle));
-            pierces(&[p, q], &triangle)
+            assert_eq!(pierces(&[p, q], &triangle, 0.05), pierces(&[q, p], &triangle, 0.05));
+            pierces(&[p, q], &triangle, 0.05)
         };
-        assert!(through(0.2, 0.3, -1.0, 0.1));
+        assert!(through(0.2, 0.3, -1.0, 0.1) && !through(0.2, 0.3, -1.0, 0.04));
         assert!(!through(0.2, 0.3, 0.1, 1.0) && !through(0.6, 0.6, -1.0, 1.0) && !through(-0.1, 0.2, -1.0, 1.0));
         // Of no length, parallel.
         assert_eq!(of_segments(&[[0.0; 3]; 2], &[[0.0, 2.0, 0.0]; 2]), 4.0);

@@ -63,7 +63,7 @@ impl Facet {
     pub fn crosses(&self, other: &Self, near: f64) -> bool {
         let through = |one: &Self, other: &Self| {
             let free = |ids: &[u32; 2]| !ids.iter().any(|id| other.ids.contains(id));
-            one.edges().iter().any(|(ids, edge)| free(ids) && pierces(edge, &other.corners))
+            one.edges().iter().any(|(ids, edge)| free(ids) && pierces(edge, &other.corners, near))
         };
         let touch = self.edges().iter().any(|(of_self, a)| {
             let apart = |ids: &[u32; 2]| !ids.iter().any(|id| of_self.contains(id));
@@ -147,13 +147,16 @@ fn height(mesh: &SolidMesh, nodes: &[u32]) -> f64 {
 }
 
 /// The nodes of two facets with an edge in common, if the other two faces of their tetrahedron are there, too, but no element
-/// is.
+/// is. The boundary is empty where cells are not cut.
 pub(super) fn hole_between(
     mesh: &SolidMesh,
     one: &Facet,
     other: &Facet,
     boundary: &HashSet<[u32; 3]>,
 ) -> Option<[u32; 4]> {
+    if boundary.is_empty() {
+        return None;
+    }
     let [a, b] = [one.only(other)?, other.only(one)?];
     let closed = one.ids.iter().filter(|&&id| id != a).all(|&id| boundary.contains(&sorted([a, b, id])));
     let [i, j, k] = one.ids;

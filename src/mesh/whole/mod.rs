@@ -42,7 +42,7 @@ pub enum Flaw {
         coincident: usize,
         /// Nodes that lie elsewhere in faces without them.
         hanging: usize,
-        /// Faces that have points with others in common, but no node within them.
+        /// Faces that have points with others in common, but no nodes near them.
         crossing: usize,
     },
     /// Faces around four nodes without an element between them.
@@ -137,55 +137,70 @@ fn apart(mesh: &SolidMesh, facets: &[Facet], tree: &BoxTree) -> Result<(), Found
         Kind::Tet4 => facets.iter().map(|facet| sorted(facet.ids)).collect(),
         Kind::Tet10 | Kind::Hex8 => HashSet::new(),
     };
-    let (mut coincident, mut hanging, mut crossing) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
-    let (mut holes, mut hole, mut first) = (BTreeSet::new(), None, None);
-    for (own, facet) in (0..).zip(facets) {
-        tree.meeting(&facet.room(), |other| {
-            let other_facet = &facets[other as usize];
-            let near = facet.near.min(other_facet.near);
-            if other <= own || other_facet.face == facet.face {
-                return;
-            }
-            let elements = [facet.element as usize, other_facet.element as usize];
-            if !boundary.is_empty()
-                && let Some(nodes) = hole_between(mesh, facet, other_facet, &boundary)
-            {
+    let (mut tears, mut holes, mut hole) = (Tears::default(), BTreeSet::new(), None);
+    tree.pairs(|one, other| {
+        let [one, other] = [one, other].map(|k| &facets[k as usize]);
+        if one.face == other.face {
+            return;
+        }
+        let elements = [one, other].map(|facet| facet.element as usize);
+        match hole_between(mesh, one, other, &boundary) {
+            Some(nodes) => {
                 hole.get_or_insert((mesh.points[nodes[0] as usize], elements));
                 holes.insert(nodes);
-                return;
             }
-            if facet.is_aside(other_facet, near) || other_facet.is_aside(facet, near) {
-                return;
-            }
-            let (mut touches, mut place) = (false, None);
-            for (one, two) in [(facet, other_facet), (other_facet, facet)] {
-                let is_node = |id: &u32| (*id as usize) < mesh.points.len();
-                for (node, x) in one.own(two).filter(|(node, _)| is_node(node)) {
-                    if to_triangle(x, &two.corners) > near * near {
-                        continue;
-                    }
-                    let met = two.own(one).find(|(id, y)| is_node(id) && of_points(x, *y) <= near * near);
-                    if met.is_some() {
-                        coincident.insert(node)
-                    } else {
-                        hanging.insert(node)
-                    };
-                    (touches, place) = (true, place.or(Some(x)));
+            None => tears.add(mesh.points.len(), one, other),
+        }
+    });
+    found(mesh, tears.flaw(), tears.first)?;
+    found(mesh, Flaw::Holes(holes.len()), hole)
+}
+
+/// Where boundary faces touch that should not.
+#[derive(Default)]
+struct Tears {
+    coincident: BTreeSet<u32>,
+    hanging: BTreeSet<u32>,
+    crossing: BTreeSet<u32>,
+    /// Faces with nodes near them.
+    touching: BTreeSet<u32>,
+    first: Option<([f64; 3], [usize; 2])>,
+}
+
+impl Tears {
+    /// Looks at two facets of a mesh with so many nodes.
+    fn add(&mut self, nodes: usize, a: &Facet, b: &Facet) {
+        let near = a.near.min(b.near);
+        if a.is_aside(b, near) || b.is_aside(a, near) {
+            return;
+        }
+        let is_node = |id: &u32| (*id as usize) < nodes;
+        let mut place = None;
+        for (one, two) in [(a, b), (b, a)] {
+            for (node, x) in one.own(two).filter(|(node, _)| is_node(node)) {
+                if to_triangle(x, &two.corners) <= near * near {
+                    let met = two.own(one).any(|(id, y)| is_node(&id) && of_points(x, y) <= near * near);
+                    if met { &mut self.coincident } else { &mut self.hanging }.insert(node);
+                    place.get_or_insert(x);
                 }
             }
-            if !touches && facet.crosses(other_facet, near) {
-                crossing.extend([facet.face, other_facet.face]);
-                place = Some(facet.corners[0]);
-            }
-            if let Some(place) = place {
-                first.get_or_insert((place, elements));
-            }
-        });
+        }
+        if place.is_some() {
+            self.touching.extend([a.face, b.face]);
+        } else if a.crosses(b, near) {
+            self.crossing.extend([a.face, b.face]);
+            place = Some(a.corners[0]);
+        }
+        self.first = self.first.or(place.map(|place| (place, [a.element as usize, b.element as usize])));
     }
-    hanging.retain(|node| !coincident.contains(node));
-    let (coincident, hanging, crossing) = (coincident.len(), hanging.len(), crossing.len());
-    found(mesh, Flaw::Torn { coincident, hanging, crossing }, first)?;
-    found(mesh, Flaw::Holes(holes.len()), hole)
+
+    fn flaw(&self) -> Flaw {
+        Flaw::Torn {
+            coincident: self.coincident.len(),
+            hanging: self.hanging.difference(&self.coincident).count(),
+            crossing: self.crossing.difference(&self.touching).count(),
+        }
+    }
 }
 
 /// Refuses pieces that share nodes.
@@ -224,7 +239,7 @@ fn inside(mesh: &SolidMesh, facets: &[Facet], tree: &BoxTree, pieces: &[u32], co
         tree.meeting(&[x, [f64::INFINITY, x[1], x[2]]], |k| {
             let Facet { corners, element, .. } = &facets[k as usize];
             let away = [x, [2.0 * around(corners)[1][0] - x[0], x[1], x[2]]];
-            if pierces(&away, corners) {
+            if pierces(&away, corners, 0.0) {
                 let [a, b, c] = *corners;
                 let (sum, _) = leaves.entry(pieces[*element as usize]).or_insert((0, *element));
                 *sum += if volume(a, b, c, x) < 0.0 { 1 } else { -1 };
