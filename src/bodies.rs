@@ -11,6 +11,7 @@ use thiserror::Error;
 use crate::comm::Comm;
 use crate::decomposition::{BodyMesh, Counts, Shape, number_bodies};
 use crate::element::Kind;
+use crate::mesh::boxes::around;
 use crate::mesh::gmsh::{Msh, Problem};
 use crate::mesh::placement::Placement;
 use crate::mesh::quality::Quality;
@@ -219,19 +220,48 @@ fn check(scene: &Scene, body: &str, mesh: &SolidMesh) -> Result<Vec<String>, Mes
             quality.worst_shape
         ));
     }
-    let mut supported: Vec<([f64; 3], &[Axis])> = Vec::new();
-    for support in scene.support.values().filter(|s| s.surface.body == body) {
-        let nodes: BTreeSet<u32> = mesh.surface(&support.surface.surface).iter().flatten().copied().collect();
-        supported.extend(nodes.into_iter().map(|n| (mesh.points[n as usize], &support.fix[..])));
+    let pieces = mesh.pieces.iter().max().map_or(1, |&last| last as usize + 1);
+    if pieces > 1 {
+        warnings.push(format!("body {body}: it is in {pieces} pieces that nothing joins; each has to be held"));
     }
-    let held = Held::at(body, &supported);
-    match held.refusal().filter(|_| !scene.touches(body)) {
-        Some(rule) => Err(MeshError::Bad(format!("body.{body}: {rule}"))),
-        None => {
-            warnings.extend(held.warning());
-            Ok(warnings)
+    for (name, held) in held(scene, body, mesh, pieces) {
+        match held.refusal().filter(|_| !scene.touches(body)) {
+            Some(rule) => return Err(MeshError::Bad(format!("body.{name}: {rule}"))),
+            None => warnings.extend(held.warning().filter(|_| warnings.len() < MOST_WARNINGS)),
         }
     }
+    Ok(warnings)
+}
+
+/// Warnings that one body gives rise to.
+const MOST_WARNINGS: usize = 10;
+
+/// What the supports do for each piece of a body, and what to call it.
+fn held(scene: &Scene, body: &str, mesh: &SolidMesh, pieces: usize) -> Vec<(String, Held)> {
+    let mut of_node = vec![0; mesh.points.len()];
+    let mut rooms = vec![Vec::new(); pieces];
+    for (element, nodes) in mesh.elements.iter().enumerate().filter(|_| pieces > 1) {
+        let piece = mesh.piece(element);
+        nodes.iter().for_each(|&node| of_node[node as usize] = piece);
+        let places = nodes.iter().map(|&node| &mesh.points[node as usize]);
+        rooms[piece] = around(rooms[piece].iter().chain(places)).to_vec();
+    }
+    let mut supported: Vec<Vec<([f64; 3], &[Axis])>> = vec![Vec::new(); pieces];
+    for support in scene.support.values().filter(|s| s.surface.body == body) {
+        let nodes: BTreeSet<u32> = mesh.surface(&support.surface.surface).iter().flatten().copied().collect();
+        for node in nodes.into_iter().map(|node| node as usize) {
+            supported[of_node[node]].push((mesh.points[node], &support.fix));
+        }
+    }
+    let name = |room: &Vec<[f64; 3]>| match room[..] {
+        [low, high] => {
+            let [x, y, z]: [f64; 3] = std::array::from_fn(|a| 0.5 * (low[a] + high[a]));
+            format!("{body}, its piece around ({x:.6}, {y:.6}, {z:.6})")
+        }
+        _ => body.to_owned(),
+    };
+    let each = rooms.iter().zip(&supported);
+    each.map(|(room, supported)| (name(room), Held::at(&name(room), supported))).collect()
 }
 
 /// Refuses more subdomains than elements; of bricks alone the scene's own checks do.

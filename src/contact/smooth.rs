@@ -5,9 +5,8 @@
 //! it. Faces around a node belong to one part if their normals differ by at most [`SHARPEST`], or if a chain of such faces
 //! leads from one to the other. Curved surfaces in facets stay whole, edges of parts and chamfers of 45 degrees do not.
 
+use super::surface::dot;
 use crate::mesh::surface::area_vector;
-
-use super::surface::{dot, unit};
 
 /// Angle between faces from which they meet at an edge, in degrees: that of most mesh generators.
 pub const SHARPEST: f64 = 40.0;
@@ -48,7 +47,9 @@ pub fn parts(faces: &[Vec<u64>], place: impl Fn(u64) -> [f64; 3]) -> Vec<Vec<u32
 fn normal(face: &[u64], place: impl Fn(u64) -> [f64; 3]) -> Option<[f64; 3]> {
     let corners = &face[..if face.len() == 4 { 4 } else { 3 }];
     let triangles = (2..corners.len()).map(|k| area_vector(&[corners[0], corners[k - 1], corners[k]].map(&place)));
-    unit(triangles.fold([0.0; 3], |sum, part| std::array::from_fn(|a| sum[a] + part[a])))
+    let whole: [f64; 3] = triangles.fold([0.0; 3], |sum, part| std::array::from_fn(|a| sum[a] + part[a]));
+    let area = dot(whole, whole).sqrt();
+    (area > 0.0).then(|| whole.map(|x| x / area))
 }
 
 /// Cuts the faces around a node into chains of smooth neighbours.
@@ -113,6 +114,8 @@ mod tests {
         let faces = [vec![0, 2, 1], vec![0, 1, 3], vec![0, 3, 2]];
         let found = parts(&faces, |node| points[node as usize]);
         assert_eq!(found.iter().map(|face| face[0]).collect::<Vec<_>>(), [0, 1, 2]);
+        // In other units too.
+        assert_eq!(found, parts(&faces, |node| points[node as usize].map(|x| 1e-12 * x)));
         let turned: Vec<Vec<u64>> = faces.iter().rev().cloned().collect();
         let mut again = parts(&turned, |node| points[node as usize]);
         again.reverse();

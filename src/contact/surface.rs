@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use super::{quadratic, smooth};
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Subdomain;
+pub use crate::mesh::near::{difference, dot};
 use crate::mesh::surface::area_vector;
 
 /// Triangles and nodes of a surface, the same on every rank.
@@ -147,16 +148,6 @@ impl GatheredSurface {
 
 /// Cosine between the normals, one of them turned around, from which two surfaces face each other.
 pub const FACING: f64 = 0.1;
-
-/// `a - b`.
-pub fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-/// `a . b`.
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
 
 /// The vector over its length, whatever that is.
 pub fn unit(v: [f64; 3]) -> Option<[f64; 3]> {

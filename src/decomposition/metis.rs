@@ -13,12 +13,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use metis::Graph;
 use metis::option::{Contig, Seed};
 
-use super::connectivity::split_into_pieces;
 use super::shares::{by_cost, interleave};
 use super::{Bodies, BodyMesh, Clusters, Patch, Shape, Subdomain};
 use crate::comm::{Comm, Shares};
 use crate::mesh::Elements;
 use crate::mesh::brick::indices;
+use crate::mesh::connectivity::split_into_pieces;
 use crate::mesh::faces::{Neighbours, key};
 
 /// How much dearer it is to cut between two elements at a contact surface.

@@ -6,7 +6,6 @@
 
 pub mod bricks;
 pub mod clusters;
-pub mod connectivity;
 pub mod cost;
 pub mod interface;
 pub mod metis;

@@ -24,6 +24,8 @@ pub struct Subdomain {
     pub id: usize,
     /// Index of its body.
     pub body: usize,
+    /// The face-connected piece of the body that it is part of, from 0.
+    pub piece: usize,
     /// Number of its material.
     pub material: usize,
     /// Global number of each local node, ascending.
@@ -45,7 +47,7 @@ impl Subdomain {
     /// From its elements (kind, and numbers of nodes within the body), the places of nodes and the ways between two, and
     /// the named surfaces that a face is on.
     fn new(
-        (id, body, material): (usize, usize, usize),
+        (id, body, piece, material): (usize, usize, usize, usize),
         first_node: u64,
         (kind, of_elements): (Kind, &[u64]),
         point: impl Fn(u64) -> [f64; 3],
@@ -71,7 +73,7 @@ impl Subdomain {
             facets.extend(surfaces(&global).into_iter().map(|surface| Facet { surface, nodes: face.clone() }));
         }
         let nodes = nodes.iter().map(|node| first_node + node).collect();
-        Self { id, body, material, nodes, points, shape, elements, facets, boundary }
+        Self { id, body, piece, material, nodes, points, shape, elements, facets, boundary }
     }
 
     /// Of a brick, from the numbers of its elements within the body (ascending).
@@ -80,7 +82,7 @@ impl Subdomain {
     /// If the body is no brick.
     pub fn of_brick(id: usize, bodies: &Bodies, body: usize, elements: &[u64]) -> Self {
         let BodyMesh { first_node, kind, ref materials, .. } = bodies.bodies[body];
-        let of = (id, body, materials[0]);
+        let of = (id, body, 0, materials[0]);
         let lattice = bodies.bodies[body].lattice().expect("the body is a brick");
         let on = |surface: &Surface, face: &[u64]| match surface.patch {
             Patch::Face(side) => face.iter().all(|&node| lattice.is_on(side, lattice.node_position(node))),
@@ -112,8 +114,9 @@ impl Subdomain {
         };
         let point = |node: u64| mesh.points[node as usize];
         let way = |from, to| relative(point(from), point(to));
-        let material = materials[mesh.region(elements[0] as usize)];
-        Self::new((id, body, material), first_node, (mesh.elements.kind(), &nodes), point, way, surfaces)
+        let first = elements[0] as usize;
+        let of = (id, body, mesh.piece(first), materials[mesh.region(first)]);
+        Self::new(of, first_node, (mesh.elements.kind(), &nodes), point, way, surfaces)
     }
 
     /// Number of local unknowns.
@@ -128,9 +131,10 @@ impl Subdomain {
 
     /// As numbers, for sending; of subdomains of meshes only, whose shape follows from their points.
     pub fn pack(&self, message: &mut Vec<u64>) {
-        let Self { id, body, material, nodes, points, elements, facets, boundary, .. } = self;
+        let Self { id, body, piece, material, nodes, points, elements, facets, boundary, .. } = self;
         message.extend(
-            [*id, *body, *material, nodes.len(), elements.len(), facets.len(), boundary.len()].map(|n| n as u64),
+            [*id, *body, *piece, *material, nodes.len(), elements.len(), facets.len(), boundary.len()]
+                .map(|n| n as u64),
         );
         message.extend(nodes);
         message.extend(points.as_flattened().iter().map(|x| x.to_bits()));
@@ -146,12 +150,13 @@ impl Subdomain {
     pub fn unpack(kind: Kind, message: &mut impl Iterator<Item = u64>) -> Option<Self> {
         let id = message.next()? as usize;
         let mut next = || message.next().expect("a packed subdomain is whole");
-        let [body, material, nodes, elements, facets, boundary] = [(); 6].map(|()| next() as usize);
+        let [body, piece, material, nodes, elements, facets, boundary] = [(); 7].map(|()| next() as usize);
         let of_nodes: Vec<u64> = (0..nodes).map(|_| next()).collect();
         let points: Vec<[f64; 3]> = (0..nodes).map(|_| [(); 3].map(|()| f64::from_bits(next()))).collect();
         Some(Self {
             id,
             body,
+            piece,
             material,
             nodes: of_nodes,
             shape: points.iter().map(|&point| relative(points[0], point)).collect(),

@@ -208,6 +208,7 @@ fn mesh_of(bricks: &[Brick]) -> SolidMesh {
         cells: 0,
         surfaces: Vec::new(),
         regions: Vec::new(),
+        pieces: Vec::new(),
     }
 }
 

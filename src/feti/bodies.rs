@@ -1,7 +1,8 @@
 //! Rigid motions of whole bodies: three translations, three rotations about the centre of the body's bounding box in units
-//! of its half diagonal. With `T_c` their share of the modes of cluster `c`, a row's force on a body is `T' G` of it,
+//! of its half diagonal. Pieces of a body that have no face in common count as bodies, here. With `T_c` their share of the modes of cluster `c`, a row's force on a body is `T' G` of it,
 //! in which gluing cancels.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use super::coarse::MODES;
@@ -12,7 +13,9 @@ use crate::decomposition::{Clusters, Subdomain};
 
 /// `T` of all clusters, on every rank.
 pub struct BodyMotions {
-    /// Centre and half diagonal of each body.
+    /// Body and piece of each, ascending.
+    pieces: Vec<[usize; 2]>,
+    /// Centre and half diagonal of each.
     frames: Vec<([f64; 3], f64)>,
     /// For each cluster its body and `T_c`, `[mode][motion]`.
     clusters: Vec<(usize, [[f64; MODES]; MODES])>,
@@ -26,14 +29,17 @@ impl BodyMotions {
         for members in members.clone() {
             let points = || subdomains[members.clone()].iter().flat_map(|s| &s.points);
             let extreme = |a: usize, sign: f64| points().fold(f64::NEG_INFINITY, |m, p| m.max(sign * p[a]));
-            mine.push(subdomains[members.start].body as f64);
+            mine.extend(piece(&subdomains[members.start]).map(|k| k as f64));
             (0..3).for_each(|a| mine.extend([extreme(a, 1.0), extreme(a, -1.0)]));
         }
-        let boxes = comm.all_gather(&mine, &clusters.shares.counts(7));
-        let bodies: Vec<usize> = boxes.chunks_exact(7).map(|b| b[0] as usize).collect();
-        let mut extents = vec![[f64::NEG_INFINITY; 6]; bodies.iter().max().map_or(0, |last| last + 1)];
-        for (values, &body) in boxes.chunks_exact(7).zip(&bodies) {
-            extents[body].iter_mut().zip(&values[1..]).for_each(|(e, v)| *e = e.max(*v));
+        let boxes = comm.all_gather(&mine, &clusters.shares.counts(8));
+        let of_clusters: Vec<[usize; 2]> = boxes.chunks_exact(8).map(|b| [b[0] as usize, b[1] as usize]).collect();
+        let pieces: Vec<[usize; 2]> = of_clusters.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
+        let number = |piece: &[usize; 2]| pieces.binary_search(piece).expect("every piece has a cluster");
+        let bodies: Vec<usize> = of_clusters.iter().map(number).collect();
+        let mut extents = vec![[f64::NEG_INFINITY; 6]; pieces.len()];
+        for (values, &body) in boxes.chunks_exact(8).zip(&bodies) {
+            extents[body].iter_mut().zip(&values[2..]).for_each(|(e, v)| *e = e.max(*v));
         }
         let frame = |e: &[f64; 6]| {
             let half = |a: usize| 0.5 * (e[2 * a] + e[2 * a + 1]);
@@ -46,7 +52,7 @@ impl BodyMotions {
             for motion in 0..MODES {
                 let mut sum = [0.0; MODES];
                 for (s, modes) in subdomains[members.clone()].iter().zip(&modes[members.clone()]) {
-                    let at = |x: &[f64; 3]| displacement(&frames[s.body], motion, x);
+                    let at = |x: &[f64; 3]| displacement(&frames[number(&piece(s))], motion, x);
                     let moved: Vec<f64> = s.points.iter().flat_map(at).collect();
                     sum.iter_mut().zip(modes.resultants(&s.points, &moved)).for_each(|(sum, x)| *sum += x);
                 }
@@ -56,10 +62,10 @@ impl BodyMotions {
         let columns = comm.all_gather(&mine, &clusters.shares.counts(MODES * MODES));
         let matrices = columns.chunks_exact(MODES * MODES);
         let matrix = |c: &[f64]| std::array::from_fn(|mode| std::array::from_fn(|motion| c[MODES * motion + mode]));
-        Self { clusters: bodies.into_iter().zip(matrices.map(matrix)).collect(), frames }
+        Self { clusters: bodies.into_iter().zip(matrices.map(matrix)).collect(), pieces, frames }
     }
 
-    /// Number of bodies.
+    /// Number of bodies, pieces of one counted one by one.
     pub fn bodies(&self) -> usize {
         self.frames.len()
     }
@@ -111,14 +117,16 @@ impl BodyMotions {
         (0..self.bodies()).map(first).collect()
     }
 
-    /// What moves most in a motion of all bodies, in words.
-    pub fn describe(&self, motion: &[f64]) -> (usize, Motion) {
+    /// What moves most in a motion of all bodies, in words: the body, and the centre of its piece if it has several.
+    pub fn describe(&self, motion: &[f64]) -> (usize, Option<[f64; 3]>, Motion) {
         let size = |body: usize| motion[MODES * body..][..MODES].iter().map(|m| m * m).sum::<f64>();
         let body = (0..self.bodies()).max_by(|&a, &b| size(a).total_cmp(&size(b)).then(b.cmp(&a))).unwrap_or(0);
         let ([t, w], (centre, half)) = ([0, 3].map(|k| vector(&motion[MODES * body + k..])), self.frames[body]);
         let (moved, turned) = (length(t), length(w));
+        let [of, _] = self.pieces[body];
+        let place = (self.pieces.iter().filter(|piece| piece[0] == of).count() > 1).then_some(centre);
         if turned <= PURE * moved {
-            return (body, Motion::Translation(t.map(|x| x / moved)));
+            return (of, place, Motion::Translation(t.map(|x| x / moved)));
         }
         // Of a screw, the point of its axis that is nearest to the centre.
         let arm = [0, 1, 2].map(|a| {
@@ -126,7 +134,8 @@ impl BodyMotions {
             half * (w[b] * t[c] - w[c] * t[b]) / (turned * turned)
         });
         (
-            body,
+            of,
+            place,
             Motion::Rotation {
                 axis: w.map(|x| x / turned),
                 through: [0, 1, 2].map(|a| centre[a] + arm[a]),
@@ -134,6 +143,10 @@ impl BodyMotions {
             },
         )
     }
+}
+
+fn piece(subdomain: &Subdomain) -> [usize; 2] {
+    [subdomain.body, subdomain.piece]
 }
 
 /// A rotation this small beside a translation is none.
@@ -285,7 +298,7 @@ mod tests {
                 let coarse = setup.bare_coarse();
                 let free = coarse.motions().free(&coarse.blocks(|row| !setup.rows()[row].is_inequality()));
                 let name = |motion: &Vec<f64>| {
-                    let (body, motion) = coarse.motions().describe(motion);
+                    let (body, _, motion) = coarse.motions().describe(motion);
                     format!("{body}: {motion}")
                 };
                 free.iter().map(name).collect::<Vec<_>>()
@@ -313,8 +326,11 @@ mod tests {
             let (arm_x, arm_z) = (3.0 - 5.0, 3.0 - 2.1);
             let motion = [arm_z, 0.0, -arm_x, 0.0, half, 0.0];
             let whole = [[0.0; 6], motion].concat();
-            let (body, motion) = coarse.motions().describe(&whole);
-            assert_eq!((body, motion.to_string()), (1, "rotation about +y through (5, 1.1, 2.1)".to_owned()));
+            let (body, place, motion) = coarse.motions().describe(&whole);
+            assert_eq!(
+                (body, place, motion.to_string()),
+                (1, None, "rotation about +y through (5, 1.1, 2.1)".to_owned())
+            );
         });
         let slanted = Motion::Translation([-0.6, 0.8, 0.0]);
         assert_eq!(slanted.to_string(), "translation along (-0.600, 0.800, 0.000)");

@@ -16,6 +16,8 @@ pub struct Neighbours {
     behind: Vec<u32>,
     /// Faces with more than two elements, or two on the same side: the mesh overlaps itself. Nobody is behind them.
     pub overlapping: u64,
+    /// A node of the first of them.
+    pub overlaps_at: Option<u32>,
 }
 
 impl Neighbours {
@@ -49,7 +51,7 @@ impl Neighbours {
             *next += 1;
         }
 
-        let mut neighbours = Self { faces, behind: vec![OUTSIDE; sorted.len()], overlapping: 0 };
+        let mut neighbours = Self { faces, behind: vec![OUTSIDE; sorted.len()], overlapping: 0, overlaps_at: None };
         let mut bucket = Vec::new();
         for range in begin.windows(2) {
             bucket.clear();
@@ -67,7 +69,10 @@ impl Neighbours {
                         neighbours.behind[a as usize] = b / faces as u32;
                         neighbours.behind[b as usize] = a / faces as u32;
                     }
-                    _ => neighbours.overlapping += 1,
+                    _ => {
+                        neighbours.overlapping += 1;
+                        neighbours.overlaps_at.get_or_insert(same[0].0[0]);
+                    }
                 }
             }
         }

@@ -76,7 +76,7 @@ impl Mapped {
             NamedSurface { name: name.to_owned(), faces: outer.iter().filter(on).cloned().collect() }
         };
         let surfaces = self.surfaces().into_iter().map(surface).collect();
-        SolidMesh { points, elements, cells, surfaces, regions: Vec::new() }
+        SolidMesh { points, elements, cells, surfaces, regions: Vec::new(), pieces: Vec::new() }
     }
 
     /// Cells of each block along its axes.

@@ -4,19 +4,24 @@
 //! structured too, but curved or of unequal cells, and stored. [`gmsh`] reads files
 //! into a [`solid`] mesh, with cells [`split`] into tetrahedra where these are wanted, and put in [`placement`].
 //! [`elements`] are known by their nodes; [`faces`] tells which are neighbours, [`surface`] integrates over boundary
-//! faces, [`quality`] counts elements that no computation could use. No displacements, no material.
+//! faces, [`quality`] counts elements that no computation could use, [`whole`] finds what only looks joined ([`boxes`] of
+//! what is [`near`]) and the pieces of a mesh by their [`connectivity`]. No displacements, no material.
 
+pub mod boxes;
 pub mod brick;
+pub mod connectivity;
 pub mod elements;
 pub mod face;
 pub mod faces;
 pub mod gmsh;
 pub mod mapped;
+pub mod near;
 pub mod placement;
 pub mod quality;
 pub mod solid;
 pub mod split;
 pub mod surface;
+pub mod whole;
 
 pub use brick::{Block, Brick};
 pub use elements::Elements;

@@ -59,7 +59,8 @@ mod tests {
 
     fn of_tets(tets: &[[[f64; 3]; 4]]) -> Quality {
         let elements = Elements::new(Kind::Tet4, (0..4 * tets.len() as u32).collect());
-        Quality::of(&SolidMesh { points: tets.concat(), elements, cells: 0, surfaces: Vec::new(), regions: Vec::new() })
+        let (points, surfaces, regions, pieces) = (tets.concat(), Vec::new(), Vec::new(), Vec::new());
+        Quality::of(&SolidMesh { points, elements, cells: 0, surfaces, regions, pieces })
     }
 
     #[test]

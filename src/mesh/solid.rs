@@ -15,6 +15,8 @@ pub struct SolidMesh {
     pub surfaces: Vec<NamedSurface>,
     /// The part of the body that each element is in; empty if there is only one.
     pub regions: Vec<u32>,
+    /// The face-connected piece of the body that each element is in; empty if there is only one.
+    pub pieces: Vec<u32>,
 }
 
 /// Part of the boundary of a mesh.
@@ -30,6 +32,11 @@ impl SolidMesh {
     /// The part of the body that an element is in.
     pub fn region(&self, element: usize) -> usize {
         self.regions.get(element).map_or(0, |&region| region as usize)
+    }
+
+    /// The piece of the body that an element is in.
+    pub fn piece(&self, element: usize) -> usize {
+        self.pieces.get(element).map_or(0, |&piece| piece as usize)
     }
 
     /// Faces of a named surface; none if there is no such surface.

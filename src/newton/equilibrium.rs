@@ -20,6 +20,8 @@ use crate::qp::nnls;
 pub struct Unheld {
     /// Index of the body that moves, or moves most.
     pub body: usize,
+    /// Centre of the piece that moves, if the body has several.
+    pub piece: Option<[f64; 3]>,
     /// How it moves.
     pub motion: Motion,
     /// The stage at whose end nothing holds it.
@@ -57,8 +59,8 @@ pub fn check(
         for (mode, along) in free.iter().zip(motion) {
             whole.iter_mut().zip(mode).for_each(|(w, x)| *w += along * x);
         }
-        let (body, motion) = motions.describe(&whole);
-        Err(Box::new(Unheld { body, motion, stage, driven }))
+        let (body, piece, motion) = motions.describe(&whole);
+        Err(Box::new(Unheld { body, piece, motion, stage, driven }))
     };
     for (stage, resultants) in (0..stages).map(|stage| (stage, resultants(stage))) {
         let (mut force, mut all) = (vec![0.0; MODES * motions.bodies()], 0.0);

@@ -34,8 +34,11 @@ fn load_step(scene: &Scene, stage: usize) -> Option<String> {
 
 /// Why a scene is refused whose supports, contacts and loads do not hold its bodies.
 pub(super) fn unheld(scene: &Scene, unheld: &Unheld) -> String {
-    let Unheld { body, motion, stage, driven } = unheld;
-    let body = scene.body.keys().nth(*body).expect("it is one of the bodies");
+    let Unheld { body, piece, motion, stage, driven } = unheld;
+    let mut body = scene.body.keys().nth(*body).expect("it is one of the bodies").clone();
+    if let Some([x, y, z]) = piece {
+        body += &format!(", its piece around ({x:.6}, {y:.6}, {z:.6})");
+    }
     let when = load_step(scene, *stage).map_or(String::new(), |step| format!(" at the end of {step}"));
     if *driven {
         format!(

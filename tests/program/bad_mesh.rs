@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::msh::{Form, write};
+use crate::common::msh::{Form, write, write_glued};
 use crate::common::{assert_program_refuses, assert_refused, assert_scene_refused, run_briefly, scene_file};
 use fetiplast::mesh::Brick;
 use tempfile::TempDir;
@@ -189,7 +189,8 @@ fn volumes_that_are_not_named_are_told_with_the_line_that_names_them() {
 #[test]
 fn volumes_that_make_no_body_and_materials_that_fit_none_are_refused() {
     let scene = ["body.below.gmsh.volume=[\"lower\", \"upper\"]"];
-    scene_refused(&scene, &["body.below: ", "`upper` has no face in common with `lower`", "BooleanFragments"]);
+    let torn = ["body.below: ", "two.msh", "volumes `lower` and `upper`", "18 nodes coincide", "BooleanFragments"];
+    scene_refused(&scene, &torn);
     let known = "`lower` (24 cells), `upper` (24 cells)";
     scene_refused(&["body.below.gmsh.volume=[\"lower\", \"core\"]"], &["body.below: ", "`core`", known]);
     let materials = |table: &str| format!("body.below.material={table}");
@@ -197,6 +198,43 @@ fn volumes_that_make_no_body_and_materials_that_fit_none_are_refused() {
     scene_refused(&missing, &["body.below.material", "no material for volume `upper`"]);
     let stranger = [scene[0], &materials("{ lower = \"steel\", uper = \"steel\" }")];
     scene_refused(&stranger, &["body.below.material.uper", "no such volume", "lower, upper"]);
+}
+
+/// A body of both volumes, whose meshes meet in part only.
+#[test]
+fn meshes_that_only_look_whole_are_refused() {
+    const PART: &str = r#"
+        [material.steel]
+        young = 210000.0
+        poisson = 0.3
+        [body.part]
+        material = "steel"
+        element = "tet4"
+        gmsh = { file = "two.msh", volume = ["lower", "upper"] }
+        [support.base]
+        surface = "part.ymin"
+        fix = ["x", "y", "z"]
+        "#;
+    let part_refused = |upper: Brick, glued: fn([f64; 3]) -> bool, parts: &[&str]| {
+        let mesh = write_glued(&[("lower", LOWER), ("upper", upper)], Form::Binary41, glued);
+        let of_both = ["body.part: ", "two.msh: volumes `lower` and `upper`, first near ("];
+        refused(PART, &mesh, &[], BAD, &[&of_both, parts].concat());
+    };
+    part_refused(UPPER, |x| x[0] < 1.5, &["(2.000000, ", "torn", "6 nodes coincide with others", "`Coherence;`"]);
+    let fine = Brick { cells: [4, 4, 2], ..UPPER };
+    part_refused(fine, |_| true, &["torn", "16 nodes hang in faces or on edges", "with a contact"]);
+    let beside = Brick { origin: [2.0, 0.0, 1.0], ..LOWER };
+    part_refused(beside, |_| true, &["3 nodes alone join parts that have no face in common"]);
+    let within = Brick { origin: [0.3; 3], size: [0.4; 3], cells: [1; 3] };
+    part_refused(within, |_| false, &["1 pieces lie inside of others", "BooleanDifference"]);
+}
+
+#[test]
+fn hexahedra_with_a_node_twice_are_refused() {
+    let text = text(Form::Text22).replacen("$Elements\n112\n", "$Elements\n113\n113 5 2 1 1 1 2 5 4 10 11 14 14 \n", 1);
+    let parts =
+        ["body.below: ", "`lower`: 1 cells have a node twice", "hexahedron near (1.000000, 1.000000, 1.000000)"];
+    mesh_refused(text, &parts);
 }
 
 #[test]
@@ -224,7 +262,8 @@ fn elements_that_cannot_be_computed_with_are_counted() {
         with(format!("{head} {}", nodes([1, 0, 2, 3]))),
         &["`lower`", "1 of 24", "inverted", "Mesh.Optimize = 1;"],
     );
-    mesh_refused(with(format!("{head} {}", nodes([0, 0, 2, 3]))), &["0 of 24", "1 have no volume", "near ("]);
+    let twice = ["`lower`", "1 cells have a node twice", "a tetrahedron near ("];
+    mesh_refused(with(format!("{head} {}", nodes([0, 0, 2, 3]))), &twice);
     let second = head.replacen(" 4 ", " 11 ", 1);
     let ten = [nodes([0, 1, 2, 3]), nodes([0, 1, 2, 3]), nodes([0, 1, 2, 3])].join(" ");
     let ten = ten.split(' ').take(10).collect::<Vec<_>>().join(" ");

@@ -6,7 +6,9 @@ use std::path::Path;
 
 use crate::common::fields::Fields;
 use crate::common::msh::{Form, write};
-use crate::common::{COARSE, assert_close, assert_near, check, number, scene_file, solve, vector};
+use crate::common::{
+    COARSE, assert_close, assert_near, assert_scene_refused, check, number, scene_file, solve, vector,
+};
 use fetiplast::mesh::Brick;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -199,4 +201,79 @@ fn unused_volumes_and_bodies_that_only_contact_holds_are_told() {
     let warnings = check(2, &scene, 1, &["support.right.fix=['x', 'y']"]).summary()["warnings"].to_string();
     assert!(warnings.contains("two.msh: no body is made of volume spare"), "{warnings}");
     assert!(warnings.contains("body upper") && warnings.contains("translation along z"), "{warnings}");
+}
+
+const LEFT: Brick = Brick { origin: [0.0; 3], size: [2.0, 2.0, 1.0], cells: [2, 2, 1] };
+const RIGHT: Brick = Brick { origin: [5.0, 0.0, 0.0], ..LEFT };
+
+/// What stands on a table: bodies of the volumes `left` and `right`, each held sideways and pressed.
+fn on_a_table(bodies: &[(&str, &str)]) -> String {
+    let table = r#"
+        [material.steel]
+        young = 210000.0
+        poisson = 0.3
+        [body.table]
+        material = "steel"
+        element = "tet4"
+        brick = { origin = [-1.0, -1.0, -1.0], size = [9.0, 4.0, 1.0], cells = [9, 4, 1] }
+        [support.floor]
+        surface = "table.zmin"
+        fix = ["x", "y", "z"]
+        "#;
+    let body = |(name, volume): &(&str, &str)| {
+        format!(
+            r#"
+            [body.{name}]
+            material = "steel"
+            element = "tet4"
+            gmsh = {{ file = "two.msh", volume = {volume} }}
+            [support.{name}]
+            surface = "{name}.xmin"
+            fix = ["x", "y"]
+            [load.{name}]
+            surface = "{name}.zmax"
+            traction = [0.0, 0.0, -10.0]
+            [contact.{name}]
+            slave = "{name}.zmin"
+            master = "table.zmax"
+            "#
+        )
+    };
+    [table.to_owned()].into_iter().chain(bodies.iter().map(body)).collect()
+}
+
+/// Pieces that only contact holds, too.
+#[test]
+fn pieces_of_one_body_are_solved_as_bodies_of_their_own() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("two.msh"), write(&[("left", LEFT), ("right", RIGHT)], Form::Text22)).unwrap();
+    let pair = on_a_table(&[("pair", r#"["left", "right"]"#)]);
+    let summary = solve(2, &scene_file(directory.path(), &pair), &TIGHT).converged().summary();
+    let warnings = summary["warnings"].to_string();
+    assert!(warnings.contains("body pair: it is in 2 pieces"), "{warnings}");
+    assert!(warnings.contains("piece around (6.000000, 1.000000, 0.500000): its supports leave 1"), "{warnings}");
+    let own = on_a_table(&[("left", r#""left""#), ("right", r#""right""#)]);
+    let bodies = solve(2, &scene_file(directory.path(), &own), &TIGHT).converged().summary();
+    for key in ["energy", "internal_energy", "max_displacement", "max_von_mises"] {
+        assert_close(key, number(&summary, key), number(&bodies, key), 1e-9);
+    }
+    assert_eq!(summary["active_contacts"], bodies["active_contacts"]);
+    assert_near("contact force", vector(&summary["contact_force"]), vector(&bodies["contact_force"]), 1e-8);
+
+    // Off the table, and without any support of its own.
+    let piece = "body.pair, its piece around (6.000000, 1.000000, 0.500000): ";
+    let short = ["body.table.brick.size=[4, 4, 1]", "body.table.brick.cells=[4, 4, 1]"];
+    assert_scene_refused(
+        &scene_file(directory.path(), &pair),
+        &short,
+        65,
+        &[piece, "loads drive its translation along -z"],
+    );
+    let mesh = String::from_utf8(write(&[("left", LEFT), ("right", RIGHT)], Form::Text22)).unwrap();
+    // Volume 2 has the surfaces from 7 on; the first is in no group of that name then.
+    fs::write(directory.path().join("two.msh"), mesh.replace(" 2 2 1 7 ", " 2 2 9 7 ")).unwrap();
+    let held = pair.replace(r#"["x", "y"]"#, r#"["x", "y", "z"]"#);
+    let (held, _) = held.split_once("[contact.").unwrap();
+    let alone = scene_file(directory.path(), held);
+    assert_scene_refused(&alone, &[], 65, &[piece, "nothing holds this body against translation along x"]);
 }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::io;
 
+use crate::mesh::whole::Flaw;
+
 /// What is wrong with a mesh file. Counts are of the file.
 #[derive(Debug, thiserror::Error)]
 pub enum Problem {
@@ -151,16 +153,15 @@ pub enum Problem {
         /// How many.
         cells: u64,
     },
-    /// Volumes of a body that nothing joins.
-    #[error(
-        "volume `{volume}` has no face in common with {others}: meshes of one body must meet node by node, as after \
-         `BooleanFragments` or `Coherence;`; what only touches is a body of its own, with a contact"
-    )]
-    Apart {
-        /// Name of the volume.
+    /// A mesh that only looks whole.
+    #[error("{volume}, first near ({:.6}, {:.6}, {:.6}): {flaw}", near[0], near[1], near[2])]
+    NotWhole {
+        /// Names of the volumes there.
         volume: String,
-        /// Names of others.
-        others: String,
+        /// Where it shows first, in the file's coordinates.
+        near: [f64; 3],
+        /// What is wrong.
+        flaw: Flaw,
     },
     /// Cells that cannot be computed with.
     #[error(
@@ -223,14 +224,33 @@ pub enum Problem {
     },
     /// Two elements on one side of a face.
     #[error(
-        "volume `{volume}`: {faces} faces have two elements on the same side, so parts of the mesh overlap; remove \
-         duplicates (`Coherence Mesh;`) and volumes that intersect (`BooleanFragments`)"
+        "volume `{volume}`: {faces} faces have two elements on the same side, the first near ({:.6}, {:.6}, {:.6}), so parts of the \
+         mesh overlap; remove duplicates (`Coherence Mesh;`) and volumes that intersect (`BooleanFragments`)",
+        near[0], near[1], near[2]
     )]
     Overlapping {
         /// Name of the volume.
         volume: String,
         /// Such faces.
         faces: u64,
+        /// A node of the first, in the file's coordinates.
+        near: [f64; 3],
+    },
+    /// Cells that have a node twice, which others beside them do not.
+    #[error(
+        "volume `{volume}`: {cells} cells have a node twice, the first is a {kind} near ({:.6}, {:.6}, {:.6}); such a cell leaves a \
+         hole: make it a prism, pyramid or tetrahedron, as Gmsh does",
+        near[0], near[1], near[2]
+    )]
+    Repeated {
+        /// Name of the first one's volume.
+        volume: String,
+        /// How many.
+        cells: u64,
+        /// Kind of the first one.
+        kind: &'static str,
+        /// The first node that is there twice, in the file's coordinates.
+        near: [f64; 3],
     },
     /// A surface that is not there.
     #[error(

@@ -238,10 +238,11 @@ fn several_volumes_are_the_regions_of_one_body() {
 
 #[test]
 fn volumes_that_make_no_body_are_refused() {
-    // An edge in common is no face.
+    // These have an edge in common, and go through each other.
     let msh = version_2(&NAMES, &NODES, &[UPPER, "4 2 2 2 1 5 3 6"]).unwrap();
-    let apart = msh.body(&["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
-    assert_says(&apart, &["`lower` has no face in common with `upper`", "BooleanFragments", "a contact"]);
+    let torn = msh.body(&["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
+    let parts = ["volumes `upper` and `lower`, first near (", "torn", "cross", "BooleanFragments", "with a contact"];
+    assert_says(&torn, &parts);
     let mut msh = version_2(&NAMES, &NODES, &[UPPER, LOWER]).unwrap();
     msh.blocks[1].groups.push(1);
     let shared = msh.body(&["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
@@ -281,7 +282,8 @@ fn cells_that_cannot_be_computed_with_are_counted() {
     let inverted = ["4 2 1 1 1 3 2 4", "4 2 1 1 1 3 2 5", "4 2 1 1 1 2 4 6"];
     let parts = ["1 of 3 elements are inverted and 0 have no volume", "(0.300000, 0.300000, 0.250000)", "Optimize"];
     assert_refused(&inverted, None, "side", &parts);
-    assert_refused(&["4 2 1 1 1 1 2 4"], None, "side", &["0 of 1 elements are inverted and 1 have no volume"]);
+    let twice = ["`upper`: 1 cells have a node twice, the first is a tetrahedron near (0.000000, 0.000000, 0.000000)"];
+    assert_refused(&["4 2 1 1 1 1 2 4"], None, "side", &twice);
     assert_refused(
         &[UPPER, "4 2 1 1 1 2 3 6", LOWER],
         Some("upper"),

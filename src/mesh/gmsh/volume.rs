@@ -8,6 +8,7 @@ use super::{Block, Msh};
 use crate::element::Kind;
 use crate::mesh::faces::Neighbours;
 use crate::mesh::quality::Quality;
+use crate::mesh::whole::{self, Found};
 use crate::mesh::{Elements, SolidMesh, split};
 
 impl Msh {
@@ -16,8 +17,8 @@ impl Msh {
     /// is. Each volume is a region; elements come in the order of the file.
     ///
     /// # Errors
-    /// If a volume or one of the surfaces is missing, volumes have no face in common or a cell, or elements cannot be
-    /// computed with.
+    /// If a volume or one of the surfaces is missing, volumes have a cell in common, elements cannot be computed with, or
+    /// the mesh only looks whole.
     pub fn body(&self, volumes: &[&str], surfaces: &[&str], kind: Kind) -> Result<SolidMesh, Problem> {
         self.refuse_untagged()?;
         let volumes = self.choose(volumes)?;
@@ -26,6 +27,7 @@ impl Msh {
         }
         let blocks = self.blocks_of(&volumes)?;
         let volume = &volumes.join("` + `");
+        self.refuse_repeated(&volumes, &blocks)?;
 
         let mut index = vec![u32::MAX; self.points.len()];
         blocks.iter().flat_map(|(b, _)| &b.nodes).for_each(|&n| index[n as usize] = 0);
@@ -57,13 +59,14 @@ impl Msh {
             return Err(Problem::TooMany { section: "Elements", items: "elements", announced, limit });
         }
         let cells = blocks.iter().map(|(b, _)| b.cells).sum();
-        let mut mesh = SolidMesh { points, elements, cells, surfaces: Vec::new(), regions };
+        let mut mesh = SolidMesh { points, elements, cells, surfaces: Vec::new(), regions, pieces: Vec::new() };
         check_elements(volume, &mesh)?;
         let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
-        if neighbours.overlapping > 0 {
-            return Err(Problem::Overlapping { volume: volume.clone(), faces: neighbours.overlapping });
+        if let Some(node) = neighbours.overlaps_at {
+            let (volume, faces, near) = (volume.clone(), neighbours.overlapping, mesh.points[node as usize]);
+            return Err(Problem::Overlapping { volume, faces, near });
         }
-        check_joined(&volumes, &mesh, &neighbours)?;
+        mesh.pieces = whole::pieces(&mesh, &neighbours).map_err(|found| not_whole(&volumes, found))?;
         mesh.surfaces =
             Boundary { msh: self, volume, mesh: &mesh, neighbours: &neighbours, index: &index }.surfaces(surfaces)?;
         Ok(mesh)
@@ -114,6 +117,21 @@ impl Msh {
         Ok(found)
     }
 
+    /// Refuses cells that have a node twice.
+    fn refuse_repeated(&self, volumes: &[String], blocks: &[(&Block, usize)]) -> Result<(), Problem> {
+        let (mut count, mut first) = (0, None);
+        for (block, volume) in blocks {
+            for cell in block.nodes.chunks_exact(block.kind.nodes) {
+                if let Some(&node) = (1..cell.len()).find(|&k| cell[..k].contains(&cell[k])).map(|k| &cell[k]) {
+                    count += 1;
+                    first.get_or_insert((block.kind.name, volumes[*volume].clone(), self.points[node as usize]));
+                }
+            }
+        }
+        let refused = |(kind, volume, near)| Err(Problem::Repeated { volume, cells: count, kind, near });
+        first.map_or(Ok(()), refused)
+    }
+
     fn refuse_untagged(&self) -> Result<(), Problem> {
         let volumes = || self.blocks.iter().filter(|b| b.kind.dimension == 3 && b.cells > 0);
         let all: u64 = volumes().map(|b| b.cells).sum();
@@ -153,21 +171,14 @@ fn check_elements(volume: &str, mesh: &SolidMesh) -> Result<(), Problem> {
     Err(Problem::BadElements { volume: volume.to_owned(), elements, inverted, degenerate, near, hint })
 }
 
-/// Refuses volumes that nothing joins to the first.
-fn check_joined(volumes: &[String], mesh: &SolidMesh, neighbours: &Neighbours) -> Result<(), Problem> {
-    let meeting =
-        |element: usize| neighbours.of(element).map(move |other| [mesh.region(element), mesh.region(other as usize)]);
-    let pairs: BTreeSet<[usize; 2]> = (0..mesh.regions.len()).flat_map(meeting).collect();
-    let mut joined = BTreeSet::from([0]);
-    for _ in volumes {
-        let next: Vec<usize> = pairs.iter().filter(|pair| joined.contains(&pair[0])).map(|pair| pair[1]).collect();
-        joined.extend(next);
-    }
-    let apart = (0..volumes.len()).find(|volume| !joined.contains(volume));
-    apart.map_or(Ok(()), |volume| {
-        let others = joined.iter().map(|&volume| format!("`{}`", volumes[volume])).collect::<Vec<_>>().join(", ");
-        Err(Problem::Apart { volume: volumes[volume].clone(), others })
-    })
+/// What only looks whole, with the names of its volumes.
+fn not_whole(volumes: &[String], Found { flaw, near, regions: [one, other] }: Found) -> Problem {
+    let volume = if one == other {
+        format!("volume `{}`", volumes[one])
+    } else {
+        format!("volumes `{}` and `{}`", volumes[one.min(other)], volumes[one.max(other)])
+    };
+    Problem::NotWhole { volume, near, flaw }
 }
 
 /// Refuses cells that the kind of element cannot be made of.

@@ -70,12 +70,21 @@ struct Entity {
 
 /// The bricks as one file. Nodes are numbered from 1, in the order of the bricks.
 pub fn write(parts: &Parts, form: Form) -> Vec<u8> {
-    let mut points = Vec::new();
+    write_glued(parts, form, |_| false)
+}
+
+/// As [`write`]; cells of later bricks have the nodes of earlier ones where these lie at a place that is `glued`.
+pub fn write_glued(parts: &Parts, form: Form, glued: impl Fn([f64; 3]) -> bool) -> Vec<u8> {
+    let mut points: Vec<[f64; 3]> = Vec::new();
     let mut entities = Vec::new();
     for (volume, (_, brick)) in (1..).zip(parts) {
         let first = points.len() + 1;
         points.extend(indices(&brick.all_nodes()).map(|at| brick.coordinates(at)));
-        let number = |node: u64| first + node as usize;
+        let number = |node: u64| {
+            let (own, place) = (first + node as usize, points[first - 1 + node as usize]);
+            let earlier = || points[..first - 1].iter().position(|x| *x == place).map(|k| k + 1);
+            if glued(place) { earlier().unwrap_or(own) } else { own }
+        };
         for (side, face) in (1..).zip(Face::ALL) {
             let cells = brick.triangles_on(face).map(|t| t.map(number).to_vec()).collect();
             entities.push(Entity { dimension: 2, tag: 6 * (volume - 1) + side, group: side, kind: 2, cells });
