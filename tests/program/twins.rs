@@ -99,10 +99,10 @@ impl Stacked {
         along(0).min(along(1))
     }
 
-    /// The widest cell of both.
-    fn spacing(&self) -> f64 {
-        let of = |block: &Block| (0..2).map(|a| block.size[a] / block.cells[a] as f64).fold(0.0, f64::max);
-        of(&self.lower).max(of(&self.upper))
+    /// Whether the load's resultant is beyond the overlap, or nearer to its edge than multipliers are that have no node in reach.
+    fn may_tip(&self) -> bool {
+        let widest = |block: &Block| (0..2).map(|a| block.size[a] / block.cells[a] as f64).fold(0.0, f64::max);
+        self.margin() < 0.25 * widest(&self.lower).max(widest(&self.upper))
     }
 
     /// Reflected at the plane x = 0.
@@ -163,7 +163,7 @@ fn random_scenes_are_what_their_twins_are() {
         let what = format!("scene {number}: {scene:?}, margin {:.3}", scene.margin());
         for end in &ends {
             match end {
-                End::Tips => assert!(scene.margin() < 0.25 * scene.spacing(), "{what} tips"),
+                End::Tips => assert!(scene.may_tip(), "{what} tips"),
                 End::Converged(summary) => {
                     assert!(scene.margin() > -1e-9, "{what} stands");
                     let force = summary.state.contact_forces["joint"][2].abs();
@@ -183,9 +183,12 @@ fn random_scenes_are_what_their_twins_are() {
         assert!(found < allowed, "{what}: exchanged energies differ by {found:.3}, errors say {allowed:.3}");
         let End::Converged(cut) = scene.solve(UPPER_SLAVE, 5) else { panic!("{what} tips where it is cut otherwise") };
         assert!(difference(upper, &cut) < 1e-7, "{what}: cut otherwise by {:.1e}", difference(upper, &cut));
-        let End::Converged(mirrored) = scene.mirrored().solve(UPPER_SLAVE, 2) else { panic!("{what} tips mirrored") };
         // Boxes of hexahedra are their own mirror images, tetrahedra lean to one side.
         let alike = [scene.lower, scene.upper].iter().all(|block| block.element == "hex8");
+        let End::Converged(mirrored) = scene.mirrored().solve(UPPER_SLAVE, 2) else {
+            assert!(!alike && scene.may_tip(), "{what} tips mirrored");
+            continue;
+        };
         let allowed = if alike { 1e-7 } else { own_error(upper) + own_error(&mirrored) };
         assert!(difference(upper, &mirrored) < allowed, "{what}: mirrored by {:.1e}", difference(upper, &mirrored));
     }
