@@ -108,7 +108,9 @@ impl TornProblem<'_> {
             radius: (numbers[19] / nodes).sqrt(),
         };
         let found: Vec<BodyBalance> = sums.chunks_exact(NUMBERS).zip(&centres).map(of_body).collect();
-        let relative = relative(&found, SIGNIFICANT * state.terms.force_squares.sqrt());
+        // As residuals are: after an unloading, with the forces that were there.
+        let before = self.committed.sizes.force_square.sqrt();
+        let relative = relative(&found, before.max(SIGNIFICANT * state.terms.force_squares.sqrt()));
         (found, relative)
     }
 
