@@ -40,7 +40,7 @@ pub struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 converged; 1 finished without convergence, results written; 64 usage; \
-                          65 bad scene or mesh; 70 bug; 74 input or output failed; 75 stopped by a signal or before \
+                          65 bad scene or mesh; 70 bug; 71 not enough memory; 74 input or output failed; 75 stopped by a signal or before \
                           the time limit, `fetiplast resume` goes on.";
 
 /// The commands.
