@@ -1,0 +1,1 @@
+//! Counts against problems that were built.
