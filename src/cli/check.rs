@@ -95,10 +95,11 @@ impl Found {
     /// Without building anything as large as the scene.
     fn from_counts(scene: &Scene, counted: &Counted, comm: &dyn Comm) -> Result<Self, Failure> {
         let mut sizes = counted.sizes();
-        let Look { contacts, mut warnings, larger } =
-            study::look(scene, counted, &mut sizes, comm).map_err(|Refused { error, larger }| {
-                Failure::Scene(format!("{error} (seen with cells {larger} times as large)"))
-            })?;
+        let refused = |Refused { error, larger }| match larger {
+            1 => Failure::Study(error),
+            _ => Failure::Scene(format!("{error} (seen with cells {larger} times as large)")),
+        };
+        let Look { contacts, mut warnings, larger } = study::look(scene, counted, &mut sizes, comm).map_err(refused)?;
         if let Some(initial) = &scene.initial {
             warnings.push(format!("initial.result = {:?} is not looked at: the scene is too large", initial.result));
         }

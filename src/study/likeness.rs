@@ -46,6 +46,7 @@ pub fn look(scene: &Scene, counted: &Counted, sizes: &mut Sizes, comm: &dyn Comm
         });
         looked.map(|discrete| (coarse, discrete, larger)).map_err(|error| Refused { error, larger })
     };
+    counted.can_be_cut().map_err(|error| Refused { error: error.into(), larger: 1 })?;
     let (coarse, discrete, larger) = at(LOOK).or_else(|_| at(8 * LOOK))?;
     let rows = conditions(scene, counted, (&coarse, &discrete), sizes, comm);
     Ok(Look { contacts: rows, warnings: discrete.warnings, larger })

@@ -2,10 +2,11 @@
 
 use std::rc::Rc;
 
-use super::discrete::Discrete;
-use super::memory::{self, Memory, PROCESS_MB, SLOT};
-use crate::comm::{Comm, Shares, ordered_sum};
+use super::discrete::{Discrete, cut};
+use super::memory::{self, Lengths, Memory, PROCESS_MB, SLOT};
+use crate::comm::{Comm, Shares, maximum, ordered_sum};
 use crate::constraint::Kind;
+use crate::decomposition::Cut;
 use crate::feti::factor::{Symbolic, analyse};
 use crate::feti::hybrid;
 use crate::feti::space::RowSpace;
@@ -50,12 +51,15 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
 /// Subdomains of equal connectivity are analysed once. Collective.
 pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
     let Discrete { decomposition, constraints, pairs, .. } = discrete;
-    let numbers = |s: &Rc<Symbolic>| {
+    let is_box = matches!(cut(&scene.decomposition.method, &discrete.bodies), Cut::Bricks(_));
+    let lengths = |s: &Rc<Symbolic>| {
         let lengths = [s.analysis().factor_length(), s.pattern.rows.len(), s.pattern.dofs()];
         let [factor, matrix, unknowns] = lengths.map(|n| n as f64);
-        memory::of_subdomain(&scene.solver, factor, matrix, unknowns)
+        Lengths { factor, matrix, unknowns }
     };
-    let numbers: f64 = analyse(&decomposition.subdomains).iter().map(numbers).sum();
+    let lengths: Vec<Lengths> = analyse(&decomposition.subdomains).iter().map(lengths).collect();
+    let numbers: f64 = lengths.iter().map(|&lengths| memory::of_subdomain(scene, lengths, is_box)).sum();
+    let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
     let clusters = decomposition.clusters.of_rank(comm.rank()).filter(|members| members.len() > 1);
     let bonds: f64 = clusters.map(|members| hybrid::numbers(&decomposition.subdomains[members]) as f64).sum();
     let slots = SLOT * constraints.slot_subdomain.len() as f64;
@@ -63,7 +67,7 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
     let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
     Memory {
         subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0],
-        rank_mb: memory::of_rank_mb(subdomains, clusters, pairs.len() as f64),
+        rank_mb: memory::of_rank_mb(subdomains, clusters, pairs.len() as f64, largest),
         cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)),
     }
 }

@@ -9,21 +9,13 @@ use crate::decomposition::{Bodies, Shape, Subdomain, number_bodies};
 use crate::element::Kind;
 use crate::feti::factor::Symbolic;
 use crate::mesh::Brick;
+use crate::study::memory::Lengths;
 
 /// Boxes with more nodes are not analysed.
 const MOST_NODES: u64 = 2500;
 
-/// Lengths of a subdomain.
-#[derive(Clone, Copy, Debug)]
-pub struct Lengths {
-    /// Of the factor.
-    pub factor: f64,
-    /// Of the lower half of the matrix.
-    pub matrix: f64,
-}
-
 /// A box of so many cells.
-pub fn of_box(kind: Kind, cells: [usize; 3]) -> Lengths {
+pub(super) fn of_box(kind: Kind, cells: [usize; 3]) -> Lengths {
     let nodes = brick(cells).refined(kind.degree()).node_count();
     if nodes <= MOST_NODES {
         return analysed(kind, cells);
@@ -33,7 +25,7 @@ pub fn of_box(kind: Kind, cells: [usize; 3]) -> Lengths {
 }
 
 /// A subdomain of so many nodes, as round as a cube.
-pub fn of_nodes(kind: Kind, nodes: f64) -> Lengths {
+pub(super) fn of_nodes(kind: Kind, nodes: f64) -> Lengths {
     let degree = kind.degree() as f64;
     let edge = ((nodes.cbrt() - 1.0) / degree).round().max(1.0) as usize;
     scaled(kind, [edge; 3], nodes)
@@ -41,9 +33,9 @@ pub fn of_nodes(kind: Kind, nodes: f64) -> Lengths {
 
 /// Of so many nodes, from a box of so many cells.
 fn scaled(kind: Kind, cells: [usize; 3], nodes: f64) -> Lengths {
-    let Lengths { factor, matrix } = of_box(kind, cells);
-    let larger = nodes / brick(cells).refined(kind.degree()).node_count() as f64;
-    Lengths { factor: factor * larger.powf(4.0 / 3.0), matrix: matrix * larger }
+    let Lengths { factor, matrix, unknowns } = of_box(kind, cells);
+    let larger = 3.0 * nodes / unknowns;
+    Lengths { factor: factor * larger.powf(4.0 / 3.0), matrix: matrix * larger, unknowns: 3.0 * nodes }
 }
 
 fn analysed(kind: Kind, cells: [usize; 3]) -> Lengths {
@@ -53,7 +45,7 @@ fn analysed(kind: Kind, cells: [usize; 3]) -> Lengths {
     let subdomain = Subdomain::of_brick(0, &all, 0, &elements);
     let symbolic = Symbolic::new(&subdomain);
     let (factor, matrix) = (symbolic.analysis().factor_length(), symbolic.pattern.rows.len());
-    Lengths { factor: factor as f64, matrix: matrix as f64 }
+    Lengths { factor: factor as f64, matrix: matrix as f64, unknowns: subdomain.dofs() as f64 }
 }
 
 fn brick(cells: [usize; 3]) -> Brick {

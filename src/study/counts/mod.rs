@@ -15,9 +15,9 @@ mod tests;
 
 use self::parts::Parts;
 use self::structured::Structured;
-use super::discrete::cut;
+use super::discrete::{can_be_cut, cut};
 use super::memory::{self, Memory, SLOT, megabytes};
-use crate::bodies;
+use crate::bodies::{self, MeshError};
 use crate::decomposition::{BodyMesh, Cut, bricks, cost, tetrahedra};
 use crate::results::summary::Sizes;
 use crate::scene::{Axis, Body, Contact, Scene, SurfaceName};
@@ -31,7 +31,7 @@ pub struct Counted<'a> {
 }
 
 /// What METIS and the graph that it cuts take for each element, in bytes.
-const CUTTING: f64 = 400.0;
+const CUTTING: f64 = 250.0;
 
 /// What is estimated where METIS cuts.
 const BY_METIS: [&str; 6] = ["subdomains", "clusters", "contact_subdomains", "primal_dofs", "gluing_rows", "dual_dofs"];
@@ -63,6 +63,14 @@ impl<'a> Counted<'a> {
         tetrahedra(&self.bodies)
     }
 
+    /// Refuses what cannot be cut.
+    ///
+    /// # Errors
+    /// If there is more than METIS can count.
+    pub fn can_be_cut(&self) -> Result<(), MeshError> {
+        can_be_cut(self.scene, &self.bodies, self.cut)
+    }
+
     /// All sizes but those of contact.
     pub fn sizes(&self) -> Sizes {
         let mut sizes = Sizes::default();
@@ -91,12 +99,13 @@ impl<'a> Counted<'a> {
 
     /// What solving takes.
     pub fn memory(&self) -> Memory {
-        let (mut numbers, mut slots, mut subdomains, mut clusters) = (0.0, 0.0, 0.0, 0.0);
+        let (mut numbers, mut slots, mut subdomains, mut clusters, mut largest) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
         for parts in self.parts() {
             numbers += parts.numbers;
             slots += parts.slots;
             subdomains += parts.count as f64;
             clusters += parts.clusters as f64;
+            largest = largest.max(parts.factor);
         }
         let conditions = self.conditions();
         // Of nodes with one copy for the most part, on both sides.
@@ -105,7 +114,7 @@ impl<'a> Counted<'a> {
         let elements = self.bodies.iter().filter(is_cut_at_once).map(|body| body.counts().elements as f64);
         Memory {
             subdomains_mb: megabytes(8.0 * (numbers + SLOT * slots)),
-            rank_mb: memory::of_rank_mb(subdomains, clusters, conditions),
+            rank_mb: memory::of_rank_mb(subdomains, clusters, conditions, largest),
             cutting_mb: megabytes(CUTTING * elements.sum::<f64>()),
         }
     }
@@ -148,14 +157,13 @@ impl<'a> Counted<'a> {
             Some(cluster) => cluster,
             None => cost::cluster(subdomains, all),
         };
-        let solver = &self.scene.solver;
         match self.cut {
             Cut::Bricks(cells) => {
                 let count = self.bodies.iter().map(|body| bricks::count(body, cells)).fold(0, usize::saturating_add);
                 let cluster = cluster(count);
                 let of = |((name, body), shape): ((&String, _), &Structured)| {
                     let touching = shape.boxes_on(cells, &self.touching(name));
-                    Parts::boxes(solver, body, cells, cluster, touching)
+                    Parts::boxes(self.scene, body, cells, cluster, touching)
                 };
                 bodies().map(of).collect()
             }
@@ -165,7 +173,7 @@ impl<'a> Counted<'a> {
                     let share = tetrahedra(std::slice::from_ref(body)) as f64 / all as f64;
                     let parts = (parts as f64 * share).max(1.0);
                     let touching = shape.on(&self.touching(name));
-                    Parts::pieces(solver, body, shape.extent(), [parts, cluster], touching as f64)
+                    Parts::pieces(self.scene, body, shape.extent(), [parts, cluster], touching as f64)
                 };
                 bodies().map(of).collect()
             }

@@ -1,15 +1,13 @@
 //! The subdomains of one body: boxes, exactly, or pieces by METIS, about.
 
-use super::local::{self, Lengths};
+use super::local;
 use crate::decomposition::{BodyMesh, bricks};
 use crate::feti::coarse::MODES;
-use crate::scene::Solver;
+use crate::scene::Scene;
 use crate::study::memory;
 
 /// Interface nodes of METIS' pieces to those of boxes.
-const RAGGED: f64 = 1.4;
-/// Factors of METIS' pieces to those of cubes of as many nodes.
-const LONGER: f64 = 1.0;
+const RAGGED: f64 = 1.27;
 /// Slots of the gluing rows of a node beyond its first copy: two where there are two, five for two copies more.
 const SLOTS: f64 = 2.2;
 
@@ -28,11 +26,13 @@ pub(super) struct Parts {
     pub slots: f64,
     /// Numbers that they hold while solving.
     pub numbers: f64,
+    /// Numbers in the factor of one.
+    pub factor: f64,
 }
 
 impl Parts {
     /// Boxes of so many cells.
-    pub fn boxes(solver: &Solver, body: &BodyMesh, cells: [usize; 3], cluster: usize, touching: u64) -> Self {
+    pub fn boxes(scene: &Scene, body: &BodyMesh, cells: [usize; 3], cluster: usize, touching: u64) -> Self {
         let along = bricks::along(body, cells);
         let count: u64 = along.iter().map(|&n| n as u64).product();
         let parts = bricks::parts(along, cluster);
@@ -40,28 +40,22 @@ impl Parts {
         let of_box: u64 = 3 * cells.iter().map(|&n| (body.kind.degree() * n + 1) as u64).product::<u64>();
         let unknowns = count * of_box;
         let members = [0, 1, 2].map(|a| along[a] as f64 / parts[a] as f64);
-        let numbers = count as f64 * held(solver, local::of_box(body.kind, cells), of_box as f64)
-            + clusters as f64 * bonds(members, of_box as f64);
+        let lengths = local::of_box(body.kind, cells);
+        let numbers =
+            count as f64 * memory::of_subdomain(scene, lengths, true) + clusters as f64 * bonds(members, of_box as f64);
         let slots = SLOTS * (unknowns - 3 * body.counts().nodes) as f64;
-        Self { count, clusters, touching, unknowns, slots, numbers }
+        Self { count, clusters, touching, unknowns, slots, numbers, factor: lengths.factor }
     }
 
     /// As many pieces as METIS is asked for, in clusters of so many, of a body with so many nodes along its axes, and on its
     /// contact surfaces.
-    pub fn pieces(
-        solver: &Solver,
-        body: &BodyMesh,
-        extent: [f64; 3],
-        [count, cluster]: [f64; 2],
-        touching: f64,
-    ) -> Self {
+    pub fn pieces(scene: &Scene, body: &BodyMesh, extent: [f64; 3], [count, cluster]: [f64; 2], touching: f64) -> Self {
         let nodes = body.counts().nodes as f64;
         let along = boxes_along(extent, count);
         let product = |x: [f64; 3]| x.iter().product::<f64>();
         let glued = RAGGED * (product([0, 1, 2].map(|a| extent[a] + along[a] - 1.0)) - product(extent));
         let of_piece = (nodes + glued) / count;
         let lengths = local::of_nodes(body.kind, of_piece);
-        let lengths = Lengths { factor: LONGER * lengths.factor, matrix: lengths.matrix };
         let members = [cluster.cbrt(); 3];
         let clusters = (count / cluster).ceil();
         let bonds = if cluster > 1.0 { clusters * bonds(members, 3.0 * of_piece) } else { 0.0 };
@@ -71,13 +65,10 @@ impl Parts {
             touching: (touching / of_piece.powf(2.0 / 3.0)).ceil().min(count.round()) as u64,
             unknowns: 3 * (body.counts().nodes + glued as u64),
             slots: 3.0 * SLOTS * glued,
-            numbers: count * held(solver, lengths, 3.0 * of_piece) + bonds,
+            numbers: count * memory::of_subdomain(scene, lengths, false) + bonds,
+            factor: lengths.factor,
         }
     }
-}
-
-fn held(solver: &Solver, lengths: Lengths, unknowns: f64) -> f64 {
-    memory::of_subdomain(solver, lengths.factor, lengths.matrix, unknowns)
 }
 
 /// Numbers that a cluster of so many members along each axis takes besides (see [`crate::feti::hybrid::numbers`]).
