@@ -23,7 +23,7 @@ pub struct Check {
 }
 
 /// Scenes of more tetrahedra are not built.
-const BUILT: u64 = 300_000;
+const BUILT: u64 = 150_000;
 
 /// Reports sizes and warnings of a scene. Collective.
 ///
