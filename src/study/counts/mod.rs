@@ -16,9 +16,10 @@ mod tests;
 use self::parts::Parts;
 use self::structured::Structured;
 use super::discrete::{can_be_cut, cut};
-use super::memory::{self, Memory, SLOT, megabytes};
+use super::memory::{self, Lengths, Memory, SLOT, megabytes};
 use crate::bodies::{self, MeshError};
 use crate::decomposition::{BodyMesh, Cut, bricks, cost, tetrahedra};
+use crate::element::Kind;
 use crate::results::summary::Sizes;
 use crate::scene::{Axis, Body, Contact, Scene, SurfaceName};
 
@@ -161,9 +162,18 @@ impl<'a> Counted<'a> {
             Cut::Bricks(cells) => {
                 let count = self.bodies.iter().map(|body| bricks::count(body, cells)).fold(0, usize::saturating_add);
                 let cluster = cluster(count);
-                let of = |((name, body), shape): ((&String, _), &Structured)| {
+                // Boxes of one kind of elements are alike.
+                let mut known: Vec<(Kind, Lengths)> = Vec::new();
+                let mut lengths = |kind: Kind| match known.iter().find(|(of, _)| *of == kind) {
+                    Some((_, lengths)) => *lengths,
+                    None => {
+                        known.push((kind, local::of_box(kind, cells)));
+                        known[known.len() - 1].1
+                    }
+                };
+                let of = |((name, body), shape): ((&String, &BodyMesh), &Structured)| {
                     let touching = shape.boxes_on(cells, &self.touching(name));
-                    Parts::boxes(self.scene, body, cells, cluster, touching)
+                    Parts::boxes(self.scene, body, (cells, lengths(body.kind)), cluster, touching)
                 };
                 bodies().map(of).collect()
             }

@@ -4,7 +4,7 @@ use super::local;
 use crate::decomposition::{BodyMesh, bricks};
 use crate::feti::coarse::MODES;
 use crate::scene::Scene;
-use crate::study::memory;
+use crate::study::memory::{self, Lengths};
 
 /// Interface nodes of METIS' pieces to those of boxes.
 const RAGGED: f64 = 1.27;
@@ -31,8 +31,14 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Boxes of so many cells.
-    pub fn boxes(scene: &Scene, body: &BodyMesh, cells: [usize; 3], cluster: usize, touching: u64) -> Self {
+    /// Boxes of so many cells, with these lengths.
+    pub fn boxes(
+        scene: &Scene,
+        body: &BodyMesh,
+        (cells, lengths): ([usize; 3], Lengths),
+        cluster: usize,
+        touching: u64,
+    ) -> Self {
         let along = bricks::along(body, cells);
         let count: u64 = along.iter().map(|&n| n as u64).product();
         let parts = bricks::parts(along, cluster);
@@ -40,7 +46,6 @@ impl Parts {
         let of_box: u64 = 3 * cells.iter().map(|&n| (body.kind.degree() * n + 1) as u64).product::<u64>();
         let unknowns = count * of_box;
         let members = [0, 1, 2].map(|a| along[a] as f64 / parts[a] as f64);
-        let lengths = local::of_box(body.kind, cells);
         let numbers =
             count as f64 * memory::of_subdomain(scene, lengths, true) + clusters as f64 * bonds(members, of_box as f64);
         let slots = SLOTS * (unknowns - 3 * body.counts().nodes) as f64;
