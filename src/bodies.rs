@@ -82,7 +82,15 @@ pub fn bricks(scene: &Scene) -> Option<Vec<BodyMesh>> {
     shapes.collect::<Option<Vec<_>>>().map(number_bodies)
 }
 
-fn kind(element: scene::Element) -> Kind {
+/// The bodies of a scene whose meshes have these sizes, body by body.
+pub(crate) fn of_counts(scene: &Scene, counts: impl Iterator<Item = Counts>) -> Vec<BodyMesh> {
+    let shape = |(body, counts): (&scene::Body, Counts)| {
+        (kind(body.element), body.brick().map_or(Shape::Mesh(counts), brick), materials(scene, body))
+    };
+    number_bodies(scene.body.values().zip(counts).map(shape))
+}
+
+pub(crate) fn kind(element: scene::Element) -> Kind {
     match element {
         scene::Element::Tet4 => Kind::Tet4,
         scene::Element::Tet10 => Kind::Tet10,

@@ -7,6 +7,7 @@ mod check;
 mod conduct;
 pub mod keeper;
 mod resume;
+mod room;
 mod solve;
 mod verify;
 
@@ -23,12 +24,13 @@ pub use self::solve::{Cascade, Solve, solve};
 pub use self::verify::{Verify, verify};
 use crate::bodies::MeshError;
 use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use crate::heap::EXIT_MEMORY;
 use crate::monitor::timing::peak_rss_mb;
 use crate::results::OutputError;
 use crate::results::agree::root_texts;
 use crate::results::summary::Summary;
 use crate::scene::{Scene, SceneError, library};
-use crate::study::{self, NoStart, StudyError};
+use crate::study::{NoStart, StudyError};
 
 /// Contact of elasto-plastic bodies in 3D by Total-FETI domain decomposition on MPI.
 #[derive(Debug, Parser)]
@@ -40,7 +42,7 @@ pub struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 converged; 1 finished without convergence, results written; 64 usage; \
-                          65 bad scene or mesh; 70 bug; 74 input or output failed; 75 stopped by a signal or before \
+                          65 bad scene or mesh; 70 bug; 71 not enough memory; 74 input or output failed; 75 stopped by a signal or before \
                           the time limit, `fetiplast resume` goes on.";
 
 /// The commands.
@@ -98,6 +100,9 @@ pub enum Failure {
     /// Results cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// The machine has not enough memory.
+    #[error("{0}")]
+    Memory(String),
     /// Somebody, or the clock, asked to stop.
     #[error("{reason}; go on with: fetiplast resume {}", path.display())]
     Stopped {
@@ -117,6 +122,7 @@ impl Failure {
             }
             Self::Scene(_) | Self::Study(_) => 65,
             Self::Input(_) | Self::Place(_) | Self::Output(_) => 74,
+            Self::Memory(_) => EXIT_MEMORY,
             Self::Stopped { .. } => 75,
         }
     }
@@ -193,16 +199,13 @@ fn run_name(source: &Source) -> String {
 }
 
 /// What the user should know before the run starts.
-fn warnings(scene: &Scene, discrete: &study::Discrete, comm: &dyn Comm) -> Vec<String> {
+fn warnings(scene: &Scene, of_meshes: &[String], subdomains: u64, comm: &dyn Comm) -> Vec<String> {
     let mut warnings = scene.warnings();
-    warnings.extend(discrete.warnings.iter().cloned());
-    let subdomains = discrete.decomposition.shares.total();
-    if subdomains < comm.size() {
-        warnings.push(format!(
-            "{} of {} ranks stay idle: there are only {subdomains} subdomains",
-            comm.size() - subdomains,
-            comm.size()
-        ));
+    warnings.extend(of_meshes.iter().cloned());
+    let ranks = comm.size() as u64;
+    if subdomains < ranks {
+        let idle = ranks - subdomains;
+        warnings.push(format!("{idle} of {ranks} ranks stay idle: there are only {subdomains} subdomains"));
     }
     warnings
 }

@@ -16,6 +16,7 @@ pub mod decomposition;
 pub mod element;
 pub mod estimate;
 pub mod feti;
+pub mod heap;
 pub mod material;
 pub mod mesh;
 pub mod monitor;

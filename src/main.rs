@@ -8,6 +8,10 @@ use fetiplast::cli::keeper::Signals;
 use fetiplast::cli::{Cli, Command, Failure, run};
 use fetiplast::comm::Comm;
 use fetiplast::comm::world::{EXIT_BUG, World};
+use fetiplast::heap::Heap;
+
+#[global_allocator]
+static HEAP: Heap = Heap;
 
 /// Exit code of a wrong command line (sysexits).
 const EXIT_USAGE: i32 = 64;

@@ -3,8 +3,11 @@
 pub mod checkpoint;
 mod conditions;
 mod contacts;
+pub mod counts;
 mod discrete;
 mod held;
+mod likeness;
+pub mod memory;
 mod meshes;
 mod places;
 mod report;
@@ -57,7 +60,8 @@ use crate::scene::{self, Scene};
 pub use conditions::RightHandSides;
 pub use discrete::{Discrete, discretise, discretise_expecting};
 pub use held::held;
-pub use sizes::{memory_estimate_mb, sizes};
+pub use likeness::{Look, Refused, look};
+pub use sizes::{memory, sizes};
 pub use state::{Earlier, NoStart, earlier};
 
 /// Why a scene has no discrete problem; the same on every rank.

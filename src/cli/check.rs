@@ -2,14 +2,18 @@
 
 use clap::Args;
 
-use super::{Failure, Source, describe_run, find, warnings};
+use super::room::Room;
+use super::{Failure, Source, describe_run, find};
 use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
 use crate::results::replace;
-use crate::results::summary::Summary;
-use crate::study::{self, StudyError};
+use crate::results::summary::{ContactRow, Sizes, Summary};
+use crate::scene::Scene;
+use crate::study::counts::Counted;
+use crate::study::memory::Memory;
+use crate::study::{self, Look, Refused, StudyError};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -17,6 +21,9 @@ pub struct Check {
     #[command(flatten)]
     source: Source,
 }
+
+/// Scenes of more tetrahedra are not built.
+const BUILT: u64 = 150_000;
 
 /// Reports sizes and warnings of a scene. Collective.
 ///
@@ -29,31 +36,77 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
     if let Some(file) = &source.summary {
         replace::probe(comm, file).map_err(Failure::Place)?;
     }
-    let discrete = study::discretise(&scene, comm)?;
-    study::held(&scene, &discrete, comm)?;
-    if let Some(initial) = &scene.initial {
-        study::earlier(comm, &scene, &discrete, initial).map_err(StudyError::from)?;
-    }
-    let sizes = study::sizes(&discrete, comm);
-    let memory = study::memory_estimate_mb(&scene, &discrete, comm);
-    let warnings = warnings(&scene, &discrete, comm);
+    let found = match Counted::new(&scene).filter(|counted| counted.tetrahedra() > BUILT) {
+        Some(counted) => Found::from_counts(&scene, &counted, comm)?,
+        None => Found::from_built(&scene, comm)?,
+    };
+    let Found { sizes, memory, contacts, mut warnings, reading_mb } = found;
+    let room = Room::find(comm, &memory);
+    warnings = super::warnings(&scene, &warnings, sizes.subdomains, comm);
+    warnings.extend(room.as_ref().and_then(Room::warning));
+    let (megabytes, available_mb) = (memory.total_mb(comm.size()), room.map(|room| room.everywhere_mb));
     monitor.event(&Event::Sizes {
         scene: source.scene.clone(),
         level: source.level,
         ranks: comm.size(),
         sizes: sizes.clone(),
     });
-    discrete.contact_rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
-    discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
-    monitor.event(&Event::Memory { megabytes: memory });
+    contacts.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
+    reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
+    monitor.event(&Event::Memory { megabytes, available_mb });
     warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
     if let Some(file) = &source.summary {
-        let mut summary = Summary { sizes, warnings, title: scene.title.clone(), ..Summary::default() };
-        summary.contacts = discrete.contact_rows.clone();
-        summary.memory_estimate_mb = Some(memory);
-        summary.mesh_reading_mb = discrete.reading_mb;
+        let mut summary = Summary { sizes, warnings, contacts, title: scene.title.clone(), ..Summary::default() };
+        summary.memory_estimate_mb = Some(megabytes);
+        summary.memory_available_mb = available_mb;
+        summary.mesh_reading_mb = reading_mb;
         describe_run(&mut summary, source, comm);
         summary.write(comm, file)?;
     }
     Ok(0)
+}
+
+/// What a check finds.
+struct Found {
+    sizes: Sizes,
+    memory: Memory,
+    contacts: Vec<ContactRow>,
+    warnings: Vec<String>,
+    reading_mb: Option<f64>,
+}
+
+impl Found {
+    /// By building the problem as solving does.
+    fn from_built(scene: &Scene, comm: &dyn Comm) -> Result<Self, Failure> {
+        let discrete = study::discretise(scene, comm)?;
+        study::held(scene, &discrete, comm)?;
+        if let Some(initial) = &scene.initial {
+            study::earlier(comm, scene, &discrete, initial).map_err(StudyError::from)?;
+        }
+        Ok(Self {
+            sizes: study::sizes(&discrete, comm),
+            memory: study::memory(scene, &discrete, comm),
+            contacts: discrete.contact_rows,
+            warnings: discrete.warnings,
+            reading_mb: discrete.reading_mb,
+        })
+    }
+
+    /// Without building anything as large as the scene.
+    fn from_counts(scene: &Scene, counted: &Counted, comm: &dyn Comm) -> Result<Self, Failure> {
+        let mut sizes = counted.sizes();
+        let refused = |Refused { error, larger }| match larger {
+            1 => Failure::Study(error),
+            _ => Failure::Scene(format!("{error} (seen with cells {larger} times as large)")),
+        };
+        let Look { contacts, mut warnings, larger } = study::look(scene, counted, &mut sizes, comm).map_err(refused)?;
+        if let Some(initial) = &scene.initial {
+            warnings.push(format!("initial.result = {:?} is not looked at: the scene is too large", initial.result));
+        }
+        let note = format!(
+            "counted, not built: what supports and contacts hold was looked at with cells {larger} times as large"
+        );
+        warnings.push(note);
+        Ok(Self { sizes, memory: counted.memory(), contacts, warnings, reading_mb: None })
+    }
 }

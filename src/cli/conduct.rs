@@ -13,6 +13,9 @@ pub struct Conduct {
     /// Life signs inside a Newton step: auto, plain or off.
     #[arg(long, value_name = "MODE", default_value = "auto", value_parser = progress)]
     pub(super) progress: Mode,
+    /// Begin even if the machine has too little memory for the run.
+    #[arg(long)]
+    pub(super) ignore_memory: bool,
     #[command(flatten)]
     pub(super) checkpoints: Checkpoints,
     /// Write what every rank did when into this directory, one file a rank, for Chrome's trace viewer or Perfetto.

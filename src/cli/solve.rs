@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::conduct::Conduct;
 use super::keeper::{Keeper, Signals};
 use super::resume::{labels, unfit};
+use super::room::Room;
 use super::{Failure, Found, Source, describe_run, find, run_name, warnings};
 use crate::comm::Comm;
 use crate::monitor::Monitor;
@@ -27,6 +28,7 @@ use crate::results::summary::{CascadeRow, CommunicationRow, Summary};
 use crate::results::vtkhdf;
 use crate::scene::Scene;
 use crate::study::checkpoint::{Unfit, pack, unpack};
+use crate::study::counts::Counted;
 use crate::study::{self, Begin, StudyError};
 
 /// Arguments of `solve`.
@@ -139,8 +141,11 @@ pub(super) fn carry_out(
     comm: &dyn Comm,
 ) -> Result<i32, Failure> {
     let Setting { mut timer, out, conduct, signals } = setting;
-    let Conduct { progress, checkpoints, trace, log_json } = conduct;
+    let Conduct { progress, ignore_memory, checkpoints, trace, log_json } = conduct;
     let mut monitor = Monitor::of_rank(comm.rank(), progress);
+    if let Some(counted) = Counted::new(scene) {
+        make_room(comm, &counted, ignore_memory, &mut monitor)?;
+    }
     if trace.is_some() {
         timer.keep_spans();
     }
@@ -159,7 +164,7 @@ pub(super) fn carry_out(
         log.into_iter().for_each(|log| monitor.add(log));
     }
     let keeper = Keeper::new(comm, timer, checkpoints, signals, out.join(format!("{name}.checkpoint.h5")));
-    let run = Run { comm, timer, keeper: &keeper, scene: scene.to_toml() };
+    let run = Run { comm, timer, keeper: &keeper, scene: scene.to_toml(), ignore_memory };
 
     let mut coarser: Option<(study::Discrete, study::Solved)> = None;
     while let [level, _, ..] = plan.levels[..] {
@@ -200,7 +205,7 @@ pub(super) fn carry_out(
     let table = PhaseTable::gather(comm, timer);
     let summary = &mut solved.summary;
     describe_run(summary, &plan.source, comm);
-    summary.warnings = warnings(scene, &discrete, comm);
+    summary.warnings = warnings(scene, &discrete.warnings, summary.sizes.subdomains, comm);
     summary.mesh_reading_mb = discrete.reading_mb;
     summary.provenance = solved.records.provenance.into_iter().filter(|(name, _)| name != "scene").collect();
     summary.cascade = plan.rows;
@@ -234,6 +239,18 @@ struct Run<'a> {
     keeper: &'a Keeper<'a>,
     /// The scene at its level.
     scene: String,
+    /// Whether to begin without enough memory.
+    ignore_memory: bool,
+}
+
+/// Refuses a run that cannot fit, unless told to begin. Collective.
+fn make_room(comm: &dyn Comm, counted: &Counted, ignore: bool, monitor: &mut Monitor) -> Result<(), Failure> {
+    let Some(room) = Room::find(comm, &counted.memory()) else { return Ok(()) };
+    if !ignore {
+        room.refuse()?;
+    }
+    room.warning().into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
+    Ok(())
 }
 
 impl Run<'_> {
@@ -253,13 +270,18 @@ impl Run<'_> {
         }
         let yielding = plan.yielding.as_deref();
         let discrete = timer.time("discretisation", || study::discretise_expecting(scene, yielding, comm))?;
+        if let Some(counted) = Counted::of_read(scene, &discrete.bodies) {
+            make_room(comm, &counted, self.ignore_memory, monitor)?;
+        }
         let sizes = study::sizes(&discrete, comm);
+        let subdomains = sizes.subdomains;
         let (name, level) = (plan.source.scene.clone(), plan.levels[0]);
         monitor.event(&Event::Sizes { scene: name, level, ranks: comm.size(), sizes });
         discrete.contact_rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
         discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
         if let [_] = plan.levels[..] {
-            warnings(scene, &discrete, comm).into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
+            let warnings = warnings(scene, &discrete.warnings, subdomains, comm);
+            warnings.into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
         }
         let refined = coarser
             .map(|(coarse, solved)| timer.time("interpolation", || study::refine(comm, (&coarse, &solved), &discrete)));

@@ -72,13 +72,13 @@ pub fn around(body: &BodyMesh, cells: [usize; 3], place: [f64; 3]) -> usize {
 }
 
 /// Number of boxes along each axis.
-fn along(body: &BodyMesh, cells: [usize; 3]) -> [usize; 3] {
+pub(crate) fn along(body: &BodyMesh, cells: [usize; 3]) -> [usize; 3] {
     std::array::from_fn(|a| brick(body).cells[a] / cells[a])
 }
 
-/// Blocks of about `cluster` neighbouring boxes in a body of so many along each axis, as their numbers, ascending: as near to
-/// cubes as the body lets them, and as equal as can be.
-fn blocks(counts: [usize; 3], cluster: usize) -> Vec<Vec<usize>> {
+/// Number of blocks of about `cluster` neighbouring boxes along each axis of a body of so many: blocks are as near to cubes as
+/// the body lets them.
+pub(crate) fn parts(counts: [usize; 3], cluster: usize) -> [usize; 3] {
     let (mut parts, mut left) = ([1; 3], cluster as f64);
     let mut axes = [0, 1, 2];
     axes.sort_by_key(|&a| counts[a]);
@@ -87,6 +87,12 @@ fn blocks(counts: [usize; 3], cluster: usize) -> Vec<Vec<usize>> {
         parts[a] = ((counts[a] as f64 / left.powf(1.0 / others)).round() as usize).clamp(1, counts[a]);
         left = (left * parts[a] as f64 / counts[a] as f64).max(1.0);
     }
+    parts
+}
+
+/// The boxes of each block, as their numbers, ascending; blocks are as equal as can be.
+fn blocks(counts: [usize; 3], cluster: usize) -> Vec<Vec<usize>> {
+    let parts = parts(counts, cluster);
     let range = |a: usize, part: usize| part * counts[a] / parts[a]..(part + 1) * counts[a] / parts[a];
     let mut blocks = Vec::new();
     for z in 0..parts[2] {

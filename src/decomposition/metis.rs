@@ -16,6 +16,7 @@ use metis::option::{Contig, Seed};
 use super::shares::{by_cost, interleave};
 use super::{Bodies, BodyMesh, Clusters, Patch, Shape, Subdomain};
 use crate::comm::{Comm, Shares};
+use crate::heap::exhausted;
 use crate::mesh::Elements;
 use crate::mesh::brick::indices;
 use crate::mesh::connectivity::split_into_pieces;
@@ -241,13 +242,16 @@ impl DualGraph {
 fn kway((begin, adjacency): (&[i32], &[i32]), weights: &[i32], wanted: i32, contiguous: bool) -> Vec<i32> {
     let mut parts = vec![0; begin.len() - 1];
     let _alone = alone();
-    Graph::new(1, wanted, begin, adjacency)
+    let cut = Graph::new(1, wanted, begin, adjacency)
         .expect("the rows are in order")
         .set_adjwgt(weights)
         .set_option(Contig(contiguous))
         .set_option(Seed(1))
-        .part_kway(&mut parts)
-        .expect("the graph is one that METIS can cut");
+        .part_kway(&mut parts);
+    match cut {
+        Err(metis::Error::Memory) => exhausted(size_of_val(adjacency)),
+        cut => cut.expect("the graph is one that METIS can cut"),
+    };
     parts
 }
 

@@ -1,6 +1,7 @@
 //! Fill-reducing ordering by METIS nested dissection of a graph whose nodes have some unknowns each.
 
 use crate::decomposition::metis::alone;
+use crate::heap::exhausted;
 
 /// The unknown at each place of the elimination, from the adjacency of the nodes with `width` unknowns each.
 ///
@@ -24,6 +25,9 @@ pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>), width: u32) -> Vec<u3
             inverse.as_mut_ptr(),
         )
     };
+    if status == metis_sys::rstatus_et_METIS_ERROR_MEMORY {
+        exhausted(size_of_val(neighbours));
+    }
     assert_eq!(status, metis_sys::rstatus_et_METIS_OK, "METIS orders a valid graph");
     forward.iter().flat_map(|&n| (0..width).map(move |a| width * n as u32 + a)).collect()
 }

@@ -31,6 +31,8 @@ pub enum Event {
     Memory {
         /// All ranks together, in MiB.
         megabytes: f64,
+        /// What their hosts have left, in MiB, where that is known.
+        available_mb: Option<f64>,
     },
     /// An increment of the load is tried; where it leads to.
     Increment(String),

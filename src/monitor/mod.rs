@@ -7,6 +7,7 @@
 
 pub mod events;
 pub mod json;
+pub mod machine;
 pub mod metered;
 pub mod plain;
 pub mod progress;

@@ -33,8 +33,10 @@ impl Plain {
             }
             Event::Contact(row) => vec![contact_line(row)],
             Event::Reading { megabytes } => vec![format!("  {:<16}{megabytes:>12.0}  MiB, rank 0", "reading meshes")],
-            Event::Memory { megabytes } => {
-                vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together", "memory estimate")]
+            Event::Memory { megabytes, available_mb } => {
+                let left = available_mb.map(|left| format!("; {left:.0} are available"));
+                let left = left.unwrap_or_default();
+                vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together{left}", "memory estimate")]
             }
             Event::NewtonStep(row) => {
                 let header = (!std::mem::replace(&mut self.newton_header_written, true)).then(newton_header);
@@ -54,25 +56,35 @@ impl Plain {
 }
 
 fn size_lines(scene: &str, level: usize, ranks: usize, sizes: &Sizes) -> Vec<String> {
-    let line = |what: &str, count: u64, detail: String| format!("  {what:<16}{count:>12}{detail}");
-    let (glue, supports, contact) = (sizes.gluing_rows, sizes.dirichlet_rows, sizes.contact_rows);
+    let about = |key: &str, count: u64| {
+        let sign = if sizes.estimated.iter().any(|estimated| estimated == key) { "~" } else { "" };
+        format!("{sign}{count}")
+    };
+    let line = |what: &str, count: String, detail: String| format!("  {what:<16}{count:>12}{detail}");
+    let contact = sizes.contact_rows;
+    let rows = format!(
+        "  {} gluing + {} support + {} contact",
+        about("gluing_rows", sizes.gluing_rows),
+        about("dirichlet_rows", sizes.dirichlet_rows),
+        about("contact_rows", contact)
+    );
     let mut share = match ranks {
         1 => "on 1 rank".to_owned(),
         _ => format!("on {ranks} ranks"),
     };
     if sizes.clusters < sizes.subdomains {
-        share = format!("in {} clusters {share}", sizes.clusters);
+        share = format!("in {} clusters {share}", about("clusters", sizes.clusters));
     }
     if contact > 0 {
-        share += &format!(", {} at contact surfaces", sizes.contact_subdomains);
+        share += &format!(", {} at contact surfaces", about("contact_subdomains", sizes.contact_subdomains));
     }
     vec![
         format!("{scene}, level {level}"),
-        line("nodes", sizes.nodes, String::new()),
-        line("elements", sizes.elements, format!("  in {} cells", sizes.cells)),
-        line("subdomains", sizes.subdomains, format!("  {share}")),
-        line("primal unknowns", sizes.primal_dofs, String::new()),
-        line("dual unknowns", sizes.dual_dofs, format!("  {glue} gluing + {supports} support + {contact} contact")),
+        line("nodes", sizes.nodes.to_string(), String::new()),
+        line("elements", sizes.elements.to_string(), format!("  in {} cells", sizes.cells)),
+        line("subdomains", about("subdomains", sizes.subdomains), format!("  {share}")),
+        line("primal unknowns", about("primal_dofs", sizes.primal_dofs), String::new()),
+        line("dual unknowns", about("dual_dofs", sizes.dual_dofs), rows),
     ]
 }
 

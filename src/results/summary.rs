@@ -59,6 +59,8 @@ pub struct Summary {
     pub mesh_reading_mb: Option<f64>,
     /// What a run would take, in MiB; from `check` only.
     pub memory_estimate_mb: Option<f64>,
+    /// What the hosts of the run have left, in MiB; from `check` only.
+    pub memory_available_mb: Option<f64>,
     /// Why the run failed.
     pub error: Option<String>,
     /// What the user should know.
@@ -213,6 +215,8 @@ pub struct Sizes {
     pub dirichlet_rows: u64,
     /// Rows of contact.
     pub contact_rows: u64,
+    /// Keys of those above that are estimated; from `check` of large scenes only.
+    pub estimated: Vec<String>,
 }
 
 /// How a contact was paired.

@@ -55,7 +55,7 @@ impl Sphere {
     pub(super) fn check(&self, key: &str) -> Checked {
         let [around, through] = self.cells;
         radii(key, self.inner, self.outer)?;
-        countable(key, &self.cells, &[3, around, around, through])
+        countable(&format!("{key}.cells"), &self.cells, &[3, around, around, through])
     }
 }
 
@@ -68,14 +68,15 @@ impl Cylinder {
         radii(key, self.inner, self.outer)?;
         let height = self.height;
         require(height.is_finite() && height > 0.0, &format!("{key}.height"), height, "must be positive and finite")?;
-        countable(key, &self.cells, &self.cells)
+        countable(&format!("{key}.cells"), &self.cells, &self.cells)
     }
 }
 
 impl Grid {
-    /// Cuts each interval into equal parts.
+    /// Cuts each interval into equal parts: into so many that the check refuses them where that is too much.
     pub(super) fn refine(&mut self, level: usize) {
         for planes in [&mut self.x, &mut self.y, &mut self.z] {
+            let level = level.min(MOST_ALONG / planes.len().saturating_sub(1).max(1) + 1);
             let between = |k: usize| {
                 let (i, part) = (k / level, (k % level) as f64 / level as f64);
                 if part == 0.0 { planes[i] } else { planes[i] + part * (planes[i + 1] - planes[i]) }
@@ -90,7 +91,10 @@ impl Grid {
             let rule = "at least two finite numbers are needed, ascending";
             require(planes.len() >= 2 && ascending, &format!("{key}.{axis}"), planes, rule)?;
         }
-        Ok(())
+        let cells = [&self.x, &self.y, &self.z].map(|planes| planes.len() - 1);
+        let fits = cells.iter().all(|&n| n <= MOST_ALONG);
+        require(fits, key, cells, "too many cells along an edge (level included)")?;
+        countable(key, &cells, &cells)
     }
 }
 
@@ -104,9 +108,11 @@ fn radii(key: &str, inner: f64, outer: f64) -> Checked {
 /// Nodes of these bodies are numbered in 32 bits, those of quadratic elements included.
 const MOST_CELLS: usize = 1 << 28;
 
+/// Planes of a grid are kept.
+const MOST_ALONG: usize = 1 << 20;
+
 fn countable(key: &str, cells: &[usize], factors: &[usize]) -> Checked {
-    let key = format!("{key}.cells");
-    require(!cells.contains(&0), &key, cells, "must be at least 1 along each edge")?;
+    require(!cells.contains(&0), key, cells, "must be at least 1 along each edge")?;
     let count = factors.iter().fold(1_usize, |product, &n| product.saturating_mul(n));
-    require(count <= MOST_CELLS, &key, cells, "too many cells (level included) to be counted")
+    require(count <= MOST_CELLS, key, cells, "too many cells (level included) to be counted")
 }

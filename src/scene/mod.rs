@@ -9,6 +9,7 @@
 mod body;
 mod changes;
 mod check;
+mod coarser;
 mod contact;
 mod decomposition;
 mod error;

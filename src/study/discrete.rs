@@ -4,7 +4,7 @@ use super::StudyError;
 use super::conditions::{self, RightHandSides};
 use super::contacts::{self, Contacts};
 use crate::assembly::loads::Load;
-use crate::bodies::Meshes;
+use crate::bodies::{MeshError, Meshes};
 use crate::comm::Comm;
 use crate::constraint::{Constraints, Support};
 use crate::contact::{ContactPair, MasterNode};
@@ -93,13 +93,9 @@ pub fn discretise_expecting(
     let touching: Vec<usize> = scene.contact.values().flat_map(scene::Contact::surfaces).map(index).collect();
 
     let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &surfaces, contact: &touching };
-    let decomposition = decomposition::tear(
-        &torn,
-        cut(&scene.decomposition.method, &bodies),
-        scene.decomposition.cluster,
-        yielding,
-        comm,
-    );
+    let cut = cut(&scene.decomposition.method, &bodies);
+    can_be_cut(scene, &bodies, cut)?;
+    let decomposition = decomposition::tear(&torn, cut, scene.decomposition.cluster, yielding, comm);
     drop(solids);
     let reading_mb = reading_mb(&bodies, comm);
 
@@ -174,6 +170,22 @@ pub(super) fn cut(wanted: &scene::Method, bodies: &[BodyMesh]) -> Cut {
             Cut::Metis(cost::subdomains(decomposition::tetrahedra(bodies), regions))
         }
     }
+}
+
+/// Refuses what METIS, whose integers have 32 bits, would lose count of.
+pub(super) fn can_be_cut(scene: &Scene, bodies: &[BodyMesh], cut: Cut) -> Result<(), MeshError> {
+    let faces = |body: &BodyMesh| body.counts().elements.saturating_mul(body.kind.faces().len() as u64);
+    let too_many = |(_, body): &(&String, &BodyMesh)| faces(body) > i32::MAX as u64;
+    let found = scene.body.keys().zip(bodies).filter(|_| matches!(cut, Cut::Metis(_))).find(too_many);
+    let refusal = |(name, body): (&String, &BodyMesh)| {
+        let (elements, faces) = (body.counts().elements, faces(body));
+        MeshError::Bad(format!(
+            "body.{name}: its {elements} elements have {faces} faces, more than the {} that METIS can count; cut bricks into \
+             boxes (decomposition.cells), or take larger cells",
+            i32::MAX
+        ))
+    };
+    found.map_or(Ok(()), |body| Err(refusal(body)))
 }
 
 fn material(m: &scene::Material) -> Material {

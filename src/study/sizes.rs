@@ -1,13 +1,17 @@
 //! How large a discrete problem is: counts in the paper's way, and the memory that solving would take.
 
-use super::discrete::Discrete;
-use crate::comm::{Comm, Shares, ordered_sum};
+use std::rc::Rc;
+
+use super::discrete::{Discrete, cut};
+use super::memory::{self, Lengths, Memory, PROCESS_MB, SLOT};
+use crate::comm::{Comm, Shares, maximum, ordered_sum};
 use crate::constraint::Kind;
-use crate::feti::factor::analyse;
+use crate::decomposition::Cut;
+use crate::feti::factor::{Symbolic, analyse};
 use crate::feti::hybrid;
 use crate::feti::space::RowSpace;
 use crate::results::summary::Sizes;
-use crate::scene::{self, Scene};
+use crate::scene::Scene;
 
 /// Counts what a discrete problem consists of, in the paper's way. Collective.
 pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
@@ -39,33 +43,31 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
         dirichlet_rows: sum[2],
         contact_rows: sum[3],
         dual_dofs: sum[1] + sum[2] + sum[3],
+        estimated: Vec::new(),
     }
 }
 
-/// Memory that solving would take on all ranks together, in MiB: factors, tangents, multipliers and coarse problem.
-/// Factors that congruent elastic subdomains share are counted for each: a material that may yield shares none in the end.
+/// Memory that solving would take: as the model of [`super::memory`] has it, from the analysis of all subdomains.
 /// Subdomains of equal connectivity are analysed once. Collective.
-pub fn memory_estimate_mb(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> f64 {
-    let Discrete { decomposition, constraints, .. } = discrete;
-    let analysed = analyse(&decomposition.subdomains);
-    // The interior factor of the Dirichlet preconditioner is about a third of the whole one on cubes.
-    let interior = if scene.solver.preconditioner == scene::Preconditioner::Dirichlet { 1.35 } else { 1.0 };
-    let factors = if scene.solver.precision == scene::Precision::Mixed { 0.5 * interior } else { interior };
-    let doubles: f64 = analysed
-        .iter()
-        .map(|s| {
-            factors * s.analysis().factor_length() as f64
-                + 1.5 * s.pattern.rows.len() as f64
-                + 12.0 * s.pattern.dofs() as f64
-        })
-        .sum();
+pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
+    let Discrete { decomposition, constraints, pairs, .. } = discrete;
+    let is_box = matches!(cut(&scene.decomposition.method, &discrete.bodies), Cut::Bricks(_));
+    let lengths = |s: &Rc<Symbolic>| {
+        let lengths = [s.analysis().factor_length(), s.pattern.rows.len(), s.pattern.dofs()];
+        let [factor, matrix, unknowns] = lengths.map(|n| n as f64);
+        Lengths { factor, matrix, unknowns }
+    };
+    let lengths: Vec<Lengths> = analyse(&decomposition.subdomains).iter().map(lengths).collect();
+    let numbers: f64 = lengths.iter().map(|&lengths| memory::of_subdomain(scene, lengths, is_box)).sum();
+    let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
     let clusters = decomposition.clusters.of_rank(comm.rank()).filter(|members| members.len() > 1);
     let bonds: f64 = clusters.map(|members| hybrid::numbers(&decomposition.subdomains[members]) as f64).sum();
-    // A row of G' and a row's terms; the coarse factor is small beside them.
-    let slots = 12.0 * constraints.slot_subdomain.len() as f64;
-    let mine = 8.0 * (doubles + bonds + slots) / f64::from(1 << 20);
-    ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0] + PROCESS_MB * comm.size() as f64
+    let slots = SLOT * constraints.slot_subdomain.len() as f64;
+    let mine = memory::megabytes(8.0 * (numbers + bonds + slots));
+    let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
+    Memory {
+        subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0],
+        rank_mb: memory::of_rank_mb(subdomains, clusters, pairs.len() as f64, largest),
+        cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)),
+    }
 }
-
-/// What a process takes before it holds anything (MPI, HDF5), in MiB.
-const PROCESS_MB: f64 = 30.0;

@@ -18,6 +18,7 @@ mod history;
 mod initial;
 mod library;
 mod loads;
+mod memory;
 mod mortar;
 mod patch;
 mod ranks;

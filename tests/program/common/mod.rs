@@ -207,6 +207,20 @@ pub fn run_in_small_room(ranks: usize, arguments: &[&str], directory: &Path, siz
     end(command, streams, |_| ())
 }
 
+/// Runs the program where each rank may have so many KiB of addresses.
+pub fn run_short_of_memory(ranks: usize, arguments: &[&str], kibibytes: usize) -> End {
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let outside = tempfile::tempdir().unwrap();
+    let (program, streams) = prepare(1, arguments, outside.path());
+    let mut command = Command::new("mpirun");
+    let limited = format!("ulimit -v {kibibytes} && exec \"$@\"");
+    command.args(["-np", &ranks.to_string(), "sh", "-c", &limited, "sh"]).arg(program.get_program());
+    command.args(program.get_args());
+    command.envs(program.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    command.stdout(File::create(&streams[0]).unwrap()).stderr(File::create(&streams[1]).unwrap());
+    end(command, streams, |_| ())
+}
+
 /// Processes that a process has started.
 pub fn children(process: u32) -> Vec<u32> {
     let text = fs::read_to_string(format!("/proc/{process}/task/{process}/children")).unwrap_or_default();
