@@ -162,16 +162,17 @@ pub fn pair(
         let weights = |of: &BTreeMap<usize, f64>, surface: &GatheredSurface| {
             of.iter().map(|(&node, sum)| (surface.nodes[node], sum / sums.own)).collect::<Vec<_>>()
         };
-        let mut gap = -dot(normal, slave.points[node]);
-        sums.slaves.iter().for_each(|(&k, sum)| gap -= sum / sums.own * dot(normal, slave.points[k]));
-        sums.masters.iter().for_each(|(&l, sum)| gap += sum / sums.own * dot(normal, master.points[l]));
+        // From the node: far from the origin, positions themselves would cost digits.
+        let height = |place: [f64; 3]| dot(normal, difference(place, slave.points[node]));
+        let of_slaves: f64 = sums.slaves.iter().map(|(&k, sum)| sum / sums.own * height(slave.points[k])).sum();
+        let of_masters: f64 = sums.masters.iter().map(|(&l, sum)| sum / sums.own * height(master.points[l])).sum();
         ContactPair {
             contact,
             slave: slave.nodes[node],
             others: weights(&sums.slaves, slave),
             masters: weights(&sums.masters, master),
             normal,
-            gap,
+            gap: of_masters - of_slaves,
             area: sums.area,
         }
     };

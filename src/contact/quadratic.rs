@@ -15,7 +15,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::ContactPair;
-use super::surface::{GatheredSurface, dot};
+use super::surface::{GatheredSurface, difference, dot};
 
 /// What a corner gets of the function of an edge's middle.
 pub const SHARE: f64 = 0.2;
@@ -67,7 +67,7 @@ pub fn distance(slave: &GatheredSurface, master: &GatheredSurface, pair: &Contac
     let place = |surface: &GatheredSurface, node: u64| {
         surface.points[surface.nodes.binary_search(&node).expect("it is on the surface")]
     };
-    dot(direction, place(master, pair.masters[0].0)) - dot(direction, place(slave, pair.slave))
+    dot(direction, difference(place(master, pair.masters[0].0), place(slave, pair.slave)))
 }
 
 #[cfg(test)]
