@@ -5,6 +5,7 @@ mod conditions;
 mod contacts;
 mod discrete;
 mod held;
+mod limits;
 mod meshes;
 mod places;
 mod report;
@@ -300,7 +301,7 @@ pub fn solve_from(
             let contact = contact_states(problem, &discrete.pairs, solution);
             let (piece, rows) = &mut *reached.borrow_mut();
             let von_mises = fields::record(piece, at.time(), problem, solution, &discrete.pairs, &contact);
-            rows.push(step_row(scene, discrete, problem, at, solution, &contact, von_mises));
+            rows.push(step_row(comm, scene, discrete, problem, (at, solution), &contact, von_mises));
             closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
         }
     };

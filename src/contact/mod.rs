@@ -14,6 +14,7 @@ pub mod mortar;
 pub mod pairing;
 pub mod quadratic;
 pub mod rigid;
+pub mod sagitta;
 pub mod surface;
 pub mod tree;
 

@@ -1,15 +1,28 @@
 //! The contacts of a scene: their pairs, and what is told of them.
 
+use super::limits::{self, Extent, Site};
 use crate::comm::Comm;
 use crate::constraint::{Support, dirichlet};
 use crate::contact::pairing::{self, Rule};
 use crate::contact::surface::{GatheredSurface, dot};
-use crate::contact::{ContactError, ContactPair, corner, quadratic, rigid};
+use crate::contact::{ContactError, ContactPair, corner, quadratic, rigid, sagitta};
 use crate::decomposition::Decomposition;
 use crate::results::summary::ContactRow;
-use crate::scene::{Contact, Scene, Sides, SurfaceName};
+use crate::scene::{Scene, Sides, SurfaceName};
 
-/// Pairs of all contacts, and a row for each contact. `index` numbers the surfaces of the decomposition. Collective.
+/// What comes of the contacts of a scene.
+pub(super) struct Paired {
+    /// Pairs of all contacts.
+    pub pairs: Vec<ContactPair>,
+    /// Where each of them is.
+    pub sites: Vec<Site>,
+    /// A row for each contact.
+    pub rows: Vec<ContactRow>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Pairs all contacts. `index` numbers the surfaces of the decomposition, `extents` are those of the bodies. Collective.
 ///
 /// # Errors
 /// If a contact has no pairs, or obstacles are too many for a node.
@@ -18,45 +31,55 @@ pub(super) fn pair(
     comm: &dyn Comm,
     decomposition: &Decomposition,
     supports: &[Support],
+    extents: &[Extent],
     index: impl Fn(&SurfaceName) -> usize,
-) -> Result<(Vec<ContactPair>, Vec<ContactRow>), ContactError> {
+) -> Result<Paired, ContactError> {
     let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
     let held = |nodes: &[u64]| dirichlet::held(comm, &decomposition.interface, supports, nodes);
-    let (mut pairs, mut rows) = (Vec::new(), Vec::new());
-    for (number, (name, Contact { sides, gap, clearance })) in scene.contact.iter().enumerate() {
-        let (slave, master, mut found, rule) = match sides {
-            Sides::Named { slave, master } => {
-                let (pairs, rule) = pairing::pair(number, name, &gather(slave), &gather(master), &held)?;
-                (slave, Some(master), pairs, rule_name(rule))
-            }
-            Sides::Either([one, other]) => {
-                let (slave, pairs, rule) = pairing::choose(number, name, [&gather(one), &gather(other)], &held)?;
-                let (slave, master) = if slave == 0 { (one, other) } else { (other, one) };
-                (slave, Some(master), pairs, rule_name(rule))
-            }
-            Sides::Rigid { slave, obstacle, .. } => {
-                let surface = gather(slave);
-                let pairs = rigid::pair(number, name, &surface, obstacle)?;
+    let mut all = Paired { pairs: Vec::new(), sites: Vec::new(), rows: Vec::new(), warnings: Vec::new() };
+    for (number, (name, contact)) in scene.contact.iter().enumerate() {
+        let surfaces: Vec<(&SurfaceName, GatheredSurface)> = contact.surfaces().map(|s| (s, gather(s))).collect();
+        let (slave, mut pairs, rule) = match (&contact.sides, &surfaces[..]) {
+            (Sides::Rigid { obstacle, .. }, [(_, slave), ..]) => {
+                let pairs = rigid::pair(number, name, slave, obstacle)?;
                 let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);
-                (slave, None, quadratic::conditions(&surface, pairs, along), "rigid")
+                (0, quadratic::conditions(slave, pairs, along), "rigid")
             }
+            (Sides::Named { .. }, [(_, slave), (_, master)]) => {
+                let (pairs, rule) = pairing::pair(number, name, slave, master, &held)?;
+                (0, pairs, rule_name(rule))
+            }
+            (Sides::Either(_), [(_, one), (_, other)]) => {
+                let (slave, pairs, rule) = pairing::choose(number, name, [one, other], &held)?;
+                (slave, pairs, rule_name(rule))
+            }
+            _ => unreachable!("two sides have two surfaces"),
         };
-        found.iter_mut().for_each(|pair| match clearance {
-            Some(clearance) => pair.set_distance(*clearance),
-            None => pair.widen(*gap),
+        pairs.iter_mut().for_each(|pair| match contact.clearance {
+            Some(clearance) => pair.set_distance(clearance),
+            None => pair.widen(contact.gap),
         });
-        rows.push(ContactRow {
+        if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
+            let found = sagitta::unresolved(&surfaces[slave].1, &master.1, &pairs);
+            all.warnings.extend(found.map(|found| limits::unresolved(name, &found, pairs.len())));
+        }
+        let sites = limits::sites(&surfaces[slave].1, &pairs);
+        let extent = |body: &String| &extents[scene.body.keys().position(|known| known == body).expect("it exists")];
+        let bodies: Vec<_> = surfaces.iter().map(|(surface, _)| (&surface.body, extent(&surface.body))).collect();
+        all.warnings.extend(limits::overlap(name, &pairs, &sites, &bodies));
+        all.rows.push(ContactRow {
             name: name.clone(),
-            slave: slave.to_string(),
-            master: master.map(SurfaceName::to_string),
+            slave: surfaces[slave].0.to_string(),
+            master: surfaces.get(1).map(|_| surfaces[1 - slave].0.to_string()),
             rule: rule.to_owned(),
-            conditions: found.len() as u64,
+            conditions: pairs.len() as u64,
         });
-        pairs.extend(found);
+        all.pairs.extend(pairs);
+        all.sites.extend(sites);
     }
     let names: Vec<String> = scene.contact.keys().cloned().collect();
-    corner::check(&names, &pairs, held)?;
-    Ok((pairs, rows))
+    corner::check(&names, &all.pairs, held)?;
+    Ok(all)
 }
 
 fn rule_name(rule: Rule) -> &'static str {

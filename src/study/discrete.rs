@@ -2,7 +2,8 @@
 
 use super::StudyError;
 use super::conditions::{self, RightHandSides};
-use super::contacts;
+use super::contacts::{self, Paired};
+use super::limits::{self, Extent, Site};
 use crate::assembly::loads::Load;
 use crate::bodies::Meshes;
 use crate::comm::Comm;
@@ -31,6 +32,10 @@ pub struct Discrete {
     pub contact_rows: Vec<ContactRow>,
     /// All contact pairs of the scene.
     pub pairs: Vec<ContactPair>,
+    /// Where each of them is.
+    pub sites: Vec<Site>,
+    /// Least and largest coordinates of each body.
+    pub extents: Vec<Extent>,
     /// Supports, in the order of their names.
     pub supports: Vec<Support>,
     /// Loads, in the order of their names.
@@ -64,7 +69,7 @@ pub fn discretise_expecting(
     yielding: Option<&[Vec<bool>]>,
     comm: &dyn Comm,
 ) -> Result<Discrete, StudyError> {
-    let Meshes { bodies, solids, warnings } = Meshes::new(scene, comm)?;
+    let Meshes { bodies, solids, mut warnings } = Meshes::new(scene, comm)?;
     let materials: Vec<Material> = scene.material.values().map(material).collect();
     let number =
         |name: &str| scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies");
@@ -103,7 +108,10 @@ pub fn discretise_expecting(
             displacement: s.displacement.unwrap_or_default(),
         })
         .collect();
-    let (pairs, contact_rows) = contacts::pair(scene, comm, &decomposition, &supports, index)?;
+    let extents = limits::extents(comm, &decomposition.subdomains, bodies.len());
+    let Paired { pairs, sites, rows: contact_rows, warnings: of_contacts } =
+        contacts::pair(scene, comm, &decomposition, &supports, &extents, index)?;
+    warnings.extend(of_contacts);
     let load = |load: &scene::Load| match load {
         scene::Load::Traction { surface, traction } => Load::Traction { surface: index(surface), value: *traction },
         scene::Load::Pressure { surface, pressure } => Load::Pressure { surface: index(surface), value: *pressure },
@@ -129,6 +137,8 @@ pub fn discretise_expecting(
         contacts,
         contact_rows,
         pairs,
+        sites,
+        extents,
         supports,
         loads,
         constraints,
