@@ -125,9 +125,9 @@ pub(super) fn overlap(
 /// What to tell of a contact whose facets do not resolve its gaps.
 pub(super) fn unresolved(name: &str, found: &Unresolved, conditions: usize) -> String {
     format!(
-        "contact.{name}: facets of its curved surfaces stand off them by up to {}, which is no less than the gap or overlap in {} \
-         of {conditions} conditions, so that pressures follow the facets: say the distance that is meant by clearance (the mean \
-         of the surfaces is about {})",
+        "contact.{name}: its surfaces are curved alike and their meshes do not match. Where it closes, pressures follow the \
+         facets, which stand off the surfaces by up to {}: in {} of {conditions} conditions the distance is less than half a \
+         facet's width. Say the distance that is meant, as in clearance = {}, the mean of the surfaces",
         short(found.sagitta),
         found.conditions,
         short(found.distance),

@@ -16,6 +16,7 @@ mod held;
 mod history;
 mod initial;
 mod library;
+mod limits;
 mod loads;
 mod mortar;
 mod patch;
