@@ -7,6 +7,7 @@ pub mod counts;
 mod discrete;
 mod held;
 mod likeness;
+mod limits;
 pub mod memory;
 mod meshes;
 mod places;
@@ -304,7 +305,7 @@ pub fn solve_from(
             let contact = contact_states(problem, solution);
             let (piece, rows) = &mut *reached.borrow_mut();
             let von_mises = fields::record(piece, at.time(), problem, solution, discrete.touching(), &contact);
-            rows.push(step_row(scene, discrete, problem, at, solution, &contact, von_mises));
+            rows.push(step_row(comm, scene, discrete, problem, (at, solution), &contact, von_mises));
             closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
         }
     };

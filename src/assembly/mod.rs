@@ -3,6 +3,7 @@
 //! Every function works on one subdomain; nothing here communicates.
 
 pub mod flow;
+pub mod gradients;
 pub mod internal;
 pub mod loads;
 pub mod pattern;

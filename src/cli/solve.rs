@@ -205,7 +205,9 @@ pub(super) fn carry_out(
     let table = PhaseTable::gather(comm, timer);
     let summary = &mut solved.summary;
     describe_run(summary, &plan.source, comm);
-    summary.warnings = warnings(scene, &discrete.warnings, summary.sizes.subdomains, comm);
+    let of_solution = std::mem::take(&mut summary.warnings);
+    let before = warnings(scene, &discrete.warnings, summary.sizes.subdomains, comm);
+    summary.warnings = [before, of_solution.clone()].concat();
     summary.mesh_reading_mb = discrete.reading_mb;
     summary.provenance = solved.records.provenance.into_iter().filter(|(name, _)| name != "scene").collect();
     summary.cascade = plan.rows;
@@ -223,6 +225,7 @@ pub(super) fn carry_out(
     monitor.event(&Event::Phases(table.clone()));
     monitor.event(&Event::Residuals(summary.state.residuals));
     monitor.event(&Event::Errors(summary.state.errors));
+    of_solution.into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
     monitor.event(&Event::Outcome {
         converged,
         newton_iterations: summary.newton_iterations.unwrap_or_default(),

@@ -15,6 +15,7 @@ pub mod mortar;
 pub mod pairing;
 pub mod quadratic;
 pub mod rigid;
+pub mod sagitta;
 pub mod smooth;
 pub mod surface;
 pub mod tree;

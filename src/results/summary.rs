@@ -127,6 +127,37 @@ pub struct State {
     /// How far the stress is from what it should be.
     #[serde(flatten)]
     pub errors: Errors,
+    /// How near it is to the limits of small strains and displacements.
+    #[serde(flatten)]
+    pub measures: Measures,
+}
+
+/// The largest value of a measure, and where it is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Extreme {
+    /// The value.
+    pub value: f64,
+    /// Name of the body or contact.
+    pub of: String,
+    /// Coordinates of an element's centre or of a node.
+    pub at: [f64; 3],
+}
+
+/// Measures of how near a solution is to the limits of the theory (`study/limits`); null where there is nothing to measure.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measures {
+    /// Norm of the strain.
+    pub max_strain: Option<Extreme>,
+    /// Angle in radians.
+    pub max_rotation: Option<Extreme>,
+    /// Displacement of a node over the diagonal of its body's bounding box.
+    pub max_relative_displacement: Option<Extreme>,
+    /// Way that a closed slave node slides, in edges of its facets.
+    pub max_sliding: Option<Extreme>,
+    /// Gap that closed over the diagonal of the slave's body.
+    pub max_closed_gap: Option<Extreme>,
+    /// Rounding of coordinates over what bodies are strained by (strain times the diagonal); null without contact.
+    pub max_rounding: Option<Extreme>,
 }
 
 /// Forces and moments on a body, these about the mean of its nodes. What supports hold of a contact's condition passes from one

@@ -75,7 +75,12 @@ fn material(key: &str, material: &Material) -> Checked {
     let allowed = |slope: f64| slope.is_finite() && slope >= 0.0;
     require(allowed(hardening), &format!("{key}.hardening"), hardening, rule)?;
     let rule = "must be finite and not negative";
-    require(allowed(kinematic_hardening), &format!("{key}.kinematic_hardening"), kinematic_hardening, rule)
+    require(allowed(kinematic_hardening), &format!("{key}.kinematic_hardening"), kinematic_hardening, rule)?;
+    for (name, slope) in [("hardening", hardening), ("kinematic_hardening", kinematic_hardening)] {
+        let rule = "nothing hardens that does not yield: add yield_stress, or remove it";
+        require(yield_stress.is_some() || slope == 0.0, &format!("{key}.{name}"), slope, rule)?;
+    }
+    Ok(())
 }
 
 fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
@@ -89,16 +94,25 @@ fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
     }
 }
 
-fn brick(key: &str, &Brick { origin, size, cells }: &Brick) -> Checked {
-    all_finite(&format!("{key}.brick.origin"), &origin)?;
+fn brick(key_of_body: &str, &Brick { origin, size, cells }: &Brick) -> Checked {
+    all_finite(&format!("{key_of_body}.brick.origin"), &origin)?;
     let positive = size.iter().all(|edge| edge.is_finite() && *edge > 0.0);
-    require(positive, &format!("{key}.brick.size"), size, "edges must be positive and finite")?;
-    let key = format!("{key}.brick.cells");
+    require(positive, &format!("{key_of_body}.brick.size"), size, "edges must be positive and finite")?;
+    let key = format!("{key_of_body}.brick.cells");
     require(!cells.contains(&0), &key, cells, "must be at least 1 along each edge")?;
     // A cell costs some tens of numbers; room for a thousand keeps every later product within the integers.
     let countable = cells.iter().try_fold(1000_usize, |product, &n| product.checked_mul(n)).is_some();
-    require(countable, &key, cells, "too many cells (level included) to be counted")
+    require(countable, &key, cells, "too many cells (level included) to be counted")?;
+    let resolved = |a: usize| {
+        let farthest = origin[a].abs().max((origin[a] + size[a]).abs());
+        size[a] / cells[a] as f64 > BLURRED * f64::EPSILON * farthest
+    };
+    let rule = "coordinates of this size cannot tell the nodes of a cell apart: move the scene nearer to the origin";
+    require((0..3).all(resolved), &format!("{key_of_body}.brick.origin"), origin, rule)
 }
+
+/// Cells must be this many roundings of their coordinates long.
+const BLURRED: f64 = 1e4;
 
 fn gmsh(key: &str, Gmsh { file, scale, rotate, translate, .. }: &Gmsh) -> Checked {
     require(!file.is_empty(), &format!("{key}.file"), file, "must be the path of a mesh file")?;
@@ -179,7 +193,12 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
         Sides::Rigid { slave, obstacle, displacement } => {
             surface(scene, &format!("{key}.slave"), slave)?;
             all_finite(&format!("{key}.displacement"), &displacement.unwrap_or_default())?;
-            return obstacle.check(&format!("{key}.rigid"));
+            obstacle.check(&format!("{key}.rigid"))?;
+            let twin = earlier(scene, contact).find(|(_, earlier)| earlier.sides == contact.sides);
+            let rule = |twin: &str| format!("contact.{twin} is the same obstacle for it; remove one of the two");
+            let of_twin =
+                |(twin, _): (&String, _)| require(false, &format!("{key}.slave"), slave.to_string(), rule(twin));
+            return twin.map_or(Ok(()), of_twin);
         }
     };
     let sides: Vec<&SurfaceName> = contact.surfaces().collect();
@@ -193,9 +212,14 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
         let surfaces: Vec<_> = earlier.surfaces().collect();
         surfaces.len() == 2 && surfaces.contains(&one) && surfaces.contains(&other)
     };
-    let twin = scene.contact.iter().take_while(|(_, earlier)| !std::ptr::eq(*earlier, contact)).find(same);
+    let twin = earlier(scene, contact).find(same);
     let rule = |twin: &str| format!("contact.{twin} is between the same two surfaces; remove one of the two");
     twin.map_or(Ok(()), |(twin, _)| require(false, &key, other.to_string(), rule(twin)))
+}
+
+/// The contacts before this one.
+fn earlier<'a>(scene: &'a Scene, contact: &Contact) -> impl Iterator<Item = (&'a String, &'a Contact)> {
+    scene.contact.iter().take_while(move |(_, earlier)| !std::ptr::eq(*earlier, contact))
 }
 
 fn initial(scene: &Scene, Initial { result, bodies }: &Initial) -> Checked {
@@ -203,6 +227,8 @@ fn initial(scene: &Scene, Initial { result, bodies }: &Initial) -> Checked {
     let Some(bodies) = bodies else { return Ok(()) };
     let key = "initial.bodies";
     require(!bodies.is_empty(), key, bodies, "name at least one body, or leave it out for all")?;
+    let once = (1..bodies.len()).all(|index| !bodies[..index].contains(&bodies[index]));
+    require(once, key, bodies, "name each body once")?;
     let stranger = bodies.iter().find(|name| !scene.body.contains_key(*name));
     stranger.map_or(Ok(()), |name| require(false, key, name, known("body", scene.body.keys())))
 }

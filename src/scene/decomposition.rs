@@ -13,6 +13,9 @@ pub struct Decomposition {
     /// Absent: by their number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cluster: Option<usize>,
+    /// Whether `cells` were given beside a method that has none: a file can keep them while its user tries these.
+    #[serde(skip)]
+    pub idle_cells: bool,
 }
 
 /// The method and its one parameter.
@@ -72,7 +75,6 @@ struct SectionError {
 impl TryFrom<Section> for Decomposition {
     type Error = SectionError;
 
-    /// `cells` beside other methods are ignored: a file can keep them while its user tries these.
     fn try_from(section: Section) -> Result<Self, SectionError> {
         let Section { method, cells, subdomains, cluster } = section;
         let method = match (method, subdomains) {
@@ -83,6 +85,7 @@ impl TryFrom<Section> for Decomposition {
             (Some(Name::Bricks), None) => Method::Bricks { cells: cells.unwrap_or(PAPER_CELLS) },
             (None, None) => cells.map_or(Method::Auto, |cells| Method::Bricks { cells }),
         };
-        Ok(Self { method, cluster })
+        let idle_cells = cells.is_some() && !matches!(method, Method::Bricks { .. });
+        Ok(Self { method, cluster, idle_cells })
     }
 }

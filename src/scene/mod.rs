@@ -14,6 +14,7 @@ mod contact;
 mod decomposition;
 mod error;
 mod held;
+mod idle;
 mod initial;
 pub mod library;
 mod load;
@@ -182,11 +183,11 @@ impl Scene {
         self.contact.values().flat_map(Contact::surfaces).any(|surface| surface.body == body)
     }
 
-    /// Sentences about what is legal but easily a mistake: bricks that only contact can hold. Other bodies are looked at when
-    /// their meshes are there.
+    /// Sentences about what is legal but easily a mistake: bricks that only contact can hold, and keys without effect. Other
+    /// bodies are looked at when their meshes are there.
     pub fn warnings(&self) -> Vec<String> {
         let bricks = self.body.iter().filter(|(_, body)| body.brick().is_some());
-        bricks.filter_map(|(name, _)| Held::brick(self, name).warning()).collect()
+        bricks.filter_map(|(name, _)| Held::brick(self, name).warning()).chain(idle::warnings(self)).collect()
     }
 }
 

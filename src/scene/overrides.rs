@@ -110,17 +110,19 @@ fn parse_value(value: &str) -> Result<Value, String> {
     }
 }
 
-/// Keys of the file that an override makes meaningless: `subdomains` alone selects metis whatever method the file has,
-/// and `method=bricks` or `method=auto` alone drops the file's `subdomains`.
+/// Keys of the file that an override makes meaningless: `subdomains` alone selects metis whatever method and cells the file
+/// has, a method alone drops the keys of others.
 fn give_way(tree: &mut Table, changes: &[Override]) {
     let given = |key: &str| changes.iter().find(|change| change.path == ["decomposition", key]);
-    let stale = match (given("method"), given("subdomains")) {
-        (None, Some(_)) => "method",
-        (Some(method), None) if matches!(method.value.as_str(), Some("bricks" | "auto")) => "subdomains",
+    let stale: &[&str] = match (given("method").map(|method| method.value.as_str()), given("subdomains")) {
+        (None, Some(_)) => &["method", "cells"],
+        (Some(Some("bricks")), None) => &["subdomains"],
+        (Some(Some("auto")), None) => &["subdomains", "cells"],
+        (Some(Some("metis")), _) => &["cells"],
         _ => return,
     };
     if let Some(Value::Table(section)) = tree.get_mut("decomposition") {
-        section.remove(stale);
+        stale.iter().for_each(|key| drop(section.remove(*key)));
     }
 }
 

@@ -14,17 +14,23 @@ pub(super) fn scene(text: &str, origin: &str, sets: &[String]) -> Result<Scene, 
         place: Place::Text { origin: origin.to_owned(), position: error.span().map(|span| line_column(text, span)) },
         message: in_user_words(error.message()),
     };
-    // A value tree knows no places, so the text is also read directly: its own errors are reported with theirs.
+    // A value tree knows no places, so the text is also read directly: its own errors are reported with theirs. But only the
+    // tree's reader minds lists that are too long.
     let unchanged = toml::from_str::<Scene>(text);
-    if sets.is_empty() {
-        return unchanged.map_err(syntax);
-    }
     let tree: Table = toml::from_str(text).map_err(syntax)?;
     let changed = overrides::apply(tree.clone(), sets)?;
     changed.try_into().map_err(|error| match unchanged {
         Err(own) => syntax(own),
+        Ok(_) if sets.is_empty() => too_long(text, origin, &error),
         Ok(_) => overrides::blame(&tree, sets, &error),
     })
+}
+
+/// The error for a tree whose text was fine; it ends with the key.
+fn too_long(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
+    let message = in_user_words(&error.to_string());
+    let key = message.rsplit('`').nth(1).unwrap_or_default();
+    SceneError::Syntax { place: place(text, origin, &[], key), message }
 }
 
 /// A message of the TOML reader on one line, without the vocabulary of Rust types.
@@ -34,6 +40,7 @@ pub(super) fn in_user_words(message: &str) -> String {
         ("missing field", "missing key"),
         ("expected usize", "expected a count (0, 1, 2, ...)"),
         ("expected f64", "expected a number"),
+        ("expected fewer elements in array", "expected fewer values"),
         ("\n", ", "),
     ];
     words.iter().fold(message.trim_end().to_owned(), |text, (from, to)| text.replace(from, to))

@@ -1,25 +1,31 @@
 //! The contacts of a scene: their conditions, and what is told of them.
 
+use super::limits::{self, Extent, Site};
 use crate::comm::Comm;
 use crate::constraint::{Support, dirichlet};
 use crate::contact::pairing::{self, Rule};
 use crate::contact::surface::{GatheredSurface, dot};
-use crate::contact::{Conditions, ContactError, ContactPair, MasterNode, corner, quadratic, rigid};
+use crate::contact::{Conditions, ContactError, ContactPair, MasterNode, corner, quadratic, rigid, sagitta};
 use crate::decomposition::Decomposition;
 use crate::results::summary::ContactRow;
-use crate::scene::{Contact, Scene, Sides, SurfaceName};
+use crate::scene::{Scene, Sides, SurfaceName};
 
-/// The contacts of a scene.
-pub(super) struct Contacts {
+/// What comes of the contacts of a scene.
+#[derive(Default)]
+pub(super) struct Paired {
     /// Pairs of all contacts.
     pub pairs: Vec<ContactPair>,
     /// Nodes of all master surfaces, by the indices of these pairs.
     pub masters: Vec<MasterNode>,
+    /// Where each of the pairs is.
+    pub sites: Vec<Site>,
     /// A row for each contact.
     pub rows: Vec<ContactRow>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
 }
 
-/// Pairs all contacts. `index` numbers the surfaces of the decomposition. Collective.
+/// Pairs all contacts. `index` numbers the surfaces of the decomposition, `extents` are those of the bodies. Collective.
 ///
 /// # Errors
 /// If a contact has no pairs, or obstacles are too many for a node.
@@ -28,49 +34,59 @@ pub(super) fn pair(
     comm: &dyn Comm,
     decomposition: &Decomposition,
     supports: &[Support],
+    extents: &[Extent],
     index: impl Fn(&SurfaceName) -> usize,
-) -> Result<Contacts, ContactError> {
+) -> Result<Paired, ContactError> {
     let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
     let held = |nodes: &[u64]| dirichlet::held(comm, &decomposition.interface, supports, nodes);
-    let mut contacts = Contacts { pairs: Vec::new(), masters: Vec::new(), rows: Vec::new() };
-    for (number, (name, Contact { sides, gap, clearance })) in scene.contact.iter().enumerate() {
-        let (slave, master, mut found, rule) = match sides {
-            Sides::Named { slave, master } => {
-                let (found, rule) = pairing::pair(number, name, &gather(slave), &gather(master), &held)?;
-                (slave, Some(master), found, rule_name(rule))
-            }
-            Sides::Either([one, other]) => {
-                let (slave, found, rule) = pairing::choose(number, name, [&gather(one), &gather(other)], &held)?;
-                let (slave, master) = if slave == 0 { (one, other) } else { (other, one) };
-                (slave, Some(master), found, rule_name(rule))
-            }
-            Sides::Rigid { slave, obstacle, .. } => {
-                let surface = gather(slave);
-                let pairs = rigid::pair(number, name, &surface, obstacle)?;
+    let mut all = Paired::default();
+    for (number, (name, contact)) in scene.contact.iter().enumerate() {
+        let surfaces: Vec<(&SurfaceName, GatheredSurface)> = contact.surfaces().map(|s| (s, gather(s))).collect();
+        let (slave, Conditions { mut pairs, mut masters, .. }, rule) = match (&contact.sides, &surfaces[..]) {
+            (Sides::Rigid { obstacle, .. }, [(_, slave), ..]) => {
+                let pairs = rigid::pair(number, name, slave, obstacle)?;
                 let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);
-                let pairs = quadratic::conditions(&surface, pairs, along);
-                (slave, None, Conditions { pairs, ..Conditions::default() }, "rigid")
+                let pairs = quadratic::conditions(slave, pairs, along);
+                (0, Conditions { pairs, ..Conditions::default() }, "rigid")
             }
+            (Sides::Named { .. }, [(_, slave), (_, master)]) => {
+                let (found, rule) = pairing::pair(number, name, slave, master, &held)?;
+                (0, found, rule_name(rule))
+            }
+            (Sides::Either(_), [(_, one), (_, other)]) => {
+                let (slave, found, rule) = pairing::choose(number, name, [one, other], &held)?;
+                (slave, found, rule_name(rule))
+            }
+            _ => unreachable!("two sides have two surfaces"),
         };
-        found.pairs.iter_mut().for_each(|pair| match clearance {
-            Some(clearance) => pair.set_distance(*clearance),
-            None => pair.widen(*gap),
+        pairs.iter_mut().for_each(|pair| match contact.clearance {
+            Some(clearance) => pair.set_distance(clearance),
+            None => pair.widen(contact.gap),
         });
-        contacts.rows.push(ContactRow {
+        if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
+            let found = sagitta::unresolved(&surfaces[slave].1, &master.1, &pairs);
+            all.warnings.extend(found.map(|found| limits::unresolved(name, &found, pairs.len())));
+        }
+        let sites = limits::sites(&surfaces[slave].1, &pairs);
+        let extent = |body: &String| &extents[scene.body.keys().position(|known| known == body).expect("it exists")];
+        let bodies: Vec<_> = surfaces.iter().map(|(surface, _)| (&surface.body, extent(&surface.body))).collect();
+        all.warnings.extend(limits::overlap(name, &pairs, &sites, &bodies));
+        all.rows.push(ContactRow {
             name: name.clone(),
-            slave: slave.to_string(),
-            master: master.map(SurfaceName::to_string),
+            slave: surfaces[slave].0.to_string(),
+            master: surfaces.get(1).map(|_| surfaces[1 - slave].0.to_string()),
             rule: rule.to_owned(),
-            conditions: found.pairs.len() as u64,
+            conditions: pairs.len() as u64,
         });
-        let first = contacts.pairs.len();
-        found.masters.iter_mut().flat_map(|node| &mut node.pairs).for_each(|(pair, _)| *pair += first);
-        contacts.masters.extend(found.masters);
-        contacts.pairs.extend(found.pairs);
+        let first = all.pairs.len();
+        masters.iter_mut().flat_map(|node| &mut node.pairs).for_each(|(pair, _)| *pair += first);
+        all.masters.extend(masters);
+        all.pairs.extend(pairs);
+        all.sites.extend(sites);
     }
     let names: Vec<String> = scene.contact.keys().cloned().collect();
-    corner::check(&names, &contacts.pairs, held)?;
-    Ok(contacts)
+    corner::check(&names, &all.pairs, held)?;
+    Ok(all)
 }
 
 fn rule_name(rule: Rule) -> &'static str {

@@ -2,7 +2,8 @@
 
 use super::StudyError;
 use super::conditions::{self, RightHandSides};
-use super::contacts::{self, Contacts};
+use super::contacts::{self, Paired};
+use super::limits::{self, Extent, Site};
 use crate::assembly::loads::Load;
 use crate::bodies::{MeshError, Meshes};
 use crate::comm::Comm;
@@ -34,6 +35,10 @@ pub struct Discrete {
     pub pairs: Vec<ContactPair>,
     /// Nodes of all master surfaces that have slaves opposite.
     pub masters: Vec<MasterNode>,
+    /// Where each of them is.
+    pub sites: Vec<Site>,
+    /// Least and largest coordinates of each body.
+    pub extents: Vec<Extent>,
     /// Supports, in the order of their names.
     pub supports: Vec<Support>,
     /// Loads, in the order of their names.
@@ -74,7 +79,7 @@ pub fn discretise_expecting(
     yielding: Option<&[Vec<bool>]>,
     comm: &dyn Comm,
 ) -> Result<Discrete, StudyError> {
-    let Meshes { bodies, solids, warnings } = Meshes::new(scene, comm)?;
+    let Meshes { bodies, solids, mut warnings } = Meshes::new(scene, comm)?;
     let materials: Vec<Material> = scene.material.values().map(material).collect();
     let number =
         |name: &str| scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies");
@@ -109,8 +114,10 @@ pub fn discretise_expecting(
             displacement: s.displacement.unwrap_or_default(),
         })
         .collect();
-    let Contacts { pairs, masters, rows: contact_rows } =
-        contacts::pair(scene, comm, &decomposition, &supports, index)?;
+    let extents = limits::extents(comm, &decomposition.subdomains, bodies.len());
+    let Paired { pairs, masters, sites, rows: contact_rows, warnings: of_contacts } =
+        contacts::pair(scene, comm, &decomposition, &supports, &extents, index)?;
+    warnings.extend(of_contacts);
     let load = |load: &scene::Load| match load {
         scene::Load::Traction { surface, traction } => Load::Traction { surface: index(surface), value: *traction },
         scene::Load::Pressure { surface, pressure } => Load::Pressure { surface: index(surface), value: *pressure },
@@ -137,6 +144,8 @@ pub fn discretise_expecting(
         contact_rows,
         pairs,
         masters,
+        sites,
+        extents,
         supports,
         loads,
         constraints,

@@ -1,6 +1,7 @@
 //! What is told of a solution: rows of the log, contact states, the summary.
 
 use super::discrete::Discrete;
+use super::limits;
 use super::sizes::sizes;
 use crate::comm::Comm;
 use crate::constraint::Kind;
@@ -55,14 +56,15 @@ pub(super) fn unheld(scene: &Scene, unheld: &Unheld) -> String {
 
 /// An increment in numbers; `von_mises` is the largest stress on this rank.
 pub(super) fn step_row(
+    comm: &dyn Comm,
     scene: &Scene,
     discrete: &Discrete,
     problem: &TornProblem,
-    at: At,
-    solution: &Solution,
+    (at, solution): (At, &Solution),
     contact: &[ContactState],
     von_mises: f64,
 ) -> StepRow {
+    let measures = limits::measure(comm, scene, discrete, problem, (at, solution), contact);
     StepRow {
         step: at.stage as u64 + 1,
         name: scene.steps()[at.stage].name.clone(),
@@ -70,7 +72,7 @@ pub(super) fn step_row(
         time: at.time(),
         halvings: at.halvings as u64,
         converged: solution.outcome == newton::Outcome::Converged,
-        state: state(scene, discrete, problem, solution, contact, von_mises),
+        state: State { measures, ..state(scene, discrete, problem, solution, contact, von_mises) },
     }
 }
 
@@ -170,6 +172,7 @@ pub(super) fn summarise(
         },
         error: failure.as_ref().and_then(message),
         newton: steps.iter().map(|(increment, record)| newton_row(*increment, record)).collect(),
+        warnings: limits::warnings(scene, &rows),
         steps: rows,
         state,
         sizes,
@@ -220,6 +223,7 @@ fn state(
             discretisation: solution.errors.as_ref().map(|errors| errors.discretisation),
             ended_by_accuracy: Some(solution.ended_by_accuracy),
         },
+        measures: summary::Measures::default(),
     }
 }
 

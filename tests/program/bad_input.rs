@@ -67,6 +67,14 @@ fn a_load_that_is_not_finite_is_refused() {
 }
 
 #[test]
+fn what_would_be_ignored_is_refused() {
+    let three = "surfaces = [\"upper.zmin\", \"lower.zmax\", \"lower.xmin\"]";
+    let sides = "slave = \"upper.zmin\"\nmaster = \"lower.zmax\"";
+    assert_text_refused(sides, three, &["line 44", "length 3", "contact.joint.surfaces"]);
+    assert_text_refused("yield_stress = 450.0\n", "", &["material.steel.hardening = 10000.0", "add yield_stress"]);
+}
+
+#[test]
 fn surfaces_that_do_not_exist_are_named() {
     assert_override_refused("support.top.surface=upper.top", &["upper.top", "zmax"]);
     assert_override_refused("contact.joint.slave=", &["contact.joint.slave="]);

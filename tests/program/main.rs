@@ -17,6 +17,7 @@ mod held;
 mod history;
 mod initial;
 mod library;
+mod limits;
 mod loads;
 mod memory;
 mod mortar;

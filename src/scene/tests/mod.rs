@@ -4,6 +4,7 @@ use super::*;
 
 mod bodies;
 mod conditions;
+mod idle;
 mod overrides;
 mod settings;
 

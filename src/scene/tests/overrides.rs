@@ -8,6 +8,7 @@ fn overrides_reach_every_kind_of_value() {
         "title=two words",
         "units='m, N, Pa'",
         "material.steel.hardening=5",
+        "material.steel.yield_stress=1",
         "body.block.brick.origin=[1, 2, 3]",
         "body.block.brick.size.2=0.5",
         "support.base.surface=block.xmin",

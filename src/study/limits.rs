@@ -1,0 +1,342 @@
+//! The limits of the theory, which is of small strains and small displacements: how near a solution comes to them, and what
+//! to tell where it is beyond.
+//!
+//! | measure | limit | why |
+//! |---|---|---|
+//! | strain: Frobenius norm at an integration point | 0.1 | what is left out is half of it, relatively |
+//! | rotation: length of half the curl of the displacement | 0.1 rad | what is left out is half its square, as a strain |
+//! | displacement over the diagonal of its body's bounding box | 0.1 | loads and contacts stay where they were |
+//! | sliding of a closed slave node over the longest edge of its facets | 1 | it presses on what it faced at the start |
+//! | gap that closes over the diagonal of the slave's body | 0.1 | normals and partners are those of before |
+//! | overlap at the start over the extent of the thinner body along the normal | 0.1 | as a strain |
+//! | rounding of coordinates over the largest strain times the diagonal of its body | 1e-3 | gaps are rounded so |
+//!
+//! Each is the largest over elements or contact conditions, and keeps the place. All but the overlap, which is known at the
+//! start, are measured at every increment that converges; the worst is told. Where a strain is singular, as at an edge that
+//! presses, it grows without bound on finer meshes.
+
+use std::collections::{BTreeSet, HashMap};
+
+use super::discrete::Discrete;
+use crate::assembly::gradients;
+use crate::comm::{Comm, all_gather_u64};
+use crate::constraint::Kind;
+use crate::contact::ContactPair;
+use crate::contact::sagitta::Unresolved;
+use crate::contact::surface::{GatheredSurface, difference, dot};
+use crate::decomposition::Subdomain;
+use crate::feti::Torn;
+use crate::newton::loading::At;
+use crate::newton::{Solution, TornProblem};
+use crate::results::contact::ContactState;
+use crate::results::summary::{Extreme, Measures, StepRow};
+use crate::scene::Scene;
+
+/// Least and largest coordinates of a body.
+pub type Extent = [[f64; 3]; 2];
+
+const STRAIN: f64 = 0.1;
+const ROTATION: f64 = 0.1;
+const DISPLACEMENT: f64 = 0.1;
+const SLIDING: f64 = 1.0;
+const CLOSED_GAP: f64 = 0.1;
+const OVERLAP: f64 = 0.1;
+const ROUNDING: f64 = 1e-3;
+
+/// Strains below are round-off.
+const NO_STRAIN: f64 = 1e-12;
+
+/// Where a contact condition is.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// Place of the slave node.
+    pub place: [f64; 3],
+    /// Longest edge of the facets around it.
+    pub facet: f64,
+}
+
+/// The sites of conditions on a surface.
+pub(super) fn sites(surface: &GatheredSurface, pairs: &[ContactPair]) -> Vec<Site> {
+    let mut longest = vec![0.0_f64; surface.nodes.len()];
+    for triangle in &surface.triangles {
+        let side = |k: usize| difference(surface.points[triangle[k]], surface.points[triangle[(k + 1) % 3]]);
+        let edge = (0..3).map(|k| length(side(k))).fold(0.0, f64::max);
+        triangle.iter().for_each(|&node| longest[node] = longest[node].max(edge));
+    }
+    let site = |pair: &ContactPair| {
+        let node = surface.nodes.binary_search(&pair.slave).expect("slave nodes are on the surface");
+        Site { place: surface.points[node], facet: longest[node] }
+    };
+    pairs.iter().map(site).collect()
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    dot(v, v).sqrt()
+}
+
+fn diagonal([low, high]: &Extent) -> f64 {
+    length(difference(*high, *low))
+}
+
+/// Extents of all bodies, from the subdomains of all ranks. Collective.
+pub(super) fn extents(comm: &dyn Comm, subdomains: &[Subdomain], bodies: usize) -> Vec<Extent> {
+    const NONE: Extent = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    let mut mine = vec![NONE; bodies];
+    let add = |[low, high]: &mut Extent, [l, h]: [[f64; 3]; 2]| {
+        (0..3).for_each(|a| (low[a], high[a]) = (low[a].min(l[a]), high[a].max(h[a])));
+    };
+    for subdomain in subdomains {
+        subdomain.points.iter().for_each(|&x| add(&mut mine[subdomain.body], [x, x]));
+    }
+    let numbers: Vec<f64> = mine.as_flattened().as_flattened().to_vec();
+    let all = comm.all_gather(&numbers, &vec![numbers.len(); comm.size()]);
+    let mut extents = vec![NONE; bodies];
+    for (k, &[a, b, c, d, e, f]) in all.as_chunks::<6>().0.iter().enumerate() {
+        add(&mut extents[k % bodies], [[a, b, c], [d, e, f]]);
+    }
+    extents
+}
+
+/// What to tell of a contact whose sides overlap too deeply at the start; `bodies` are those of its sides.
+pub(super) fn overlap(
+    name: &str,
+    pairs: &[ContactPair],
+    sites: &[Site],
+    bodies: &[(&String, &Extent)],
+) -> Option<String> {
+    let relative = |(pair, site): (&ContactPair, &Site)| {
+        let along = |[low, high]: &Extent| (0..3).map(|a| pair.normal[a].abs() * (high[a] - low[a])).sum::<f64>();
+        let thin = bodies.iter().map(|(name, extent)| (along(extent), *name)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let depth = -pair.gap;
+        (depth > OVERLAP * thin.0).then_some((depth / thin.0, depth, thin, site.place))
+    };
+    let found = pairs.iter().zip(sites).filter_map(relative);
+    let (share, depth, (extent, body), place) = found.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
+    Some(format!(
+        "contact.{name}: its sides overlap by {} near {}, {} of the {} that body {body} extends there; small strains allow \
+         {OVERLAP} of it: check the places of the bodies, gap and clearance",
+        short(depth),
+        shown(place),
+        short(share),
+        short(extent),
+    ))
+}
+
+/// What to tell of a contact whose facets do not resolve its gaps.
+pub(super) fn unresolved(name: &str, found: &Unresolved, conditions: usize) -> String {
+    format!(
+        "contact.{name}: its surfaces are curved alike and their meshes do not match. Where it closes, pressures follow the \
+         facets, which stand off the surfaces by up to {}: in {} of {conditions} conditions the distance is less than half a \
+         facet's width. Say the distance that is meant, as in clearance = {}, the mean of the surfaces",
+        short(found.sagitta),
+        found.conditions,
+        short(found.distance),
+    )
+}
+
+/// The largest value so far, and where.
+#[derive(Clone, Copy)]
+struct Worst {
+    value: f64,
+    of: usize,
+    place: [f64; 3],
+}
+
+impl Worst {
+    const NONE: Self = Self { value: 0.0, of: 0, place: [0.0; 3] };
+
+    fn add(&mut self, value: f64, of: usize, place: impl FnOnce() -> [f64; 3]) {
+        if value > self.value {
+            *self = Self { value, of, place: place() };
+        }
+    }
+}
+
+/// Measures of bodies: strain, rotation, displacement, and the strain times its body's diagonal (length).
+const OF_BODIES: usize = 4;
+/// Measures of contacts: sliding and the gap that closes.
+const OF_CONTACTS: usize = 2;
+
+/// How near a solution comes to the limits. Collective.
+pub(super) fn measure(
+    comm: &dyn Comm,
+    scene: &Scene,
+    discrete: &Discrete,
+    problem: &TornProblem,
+    (at, solution): (At, &Solution),
+    contact: &[ContactState],
+) -> Measures {
+    let of_nodes = displacements(comm, discrete, &solution.u);
+    let mut state_of = vec![None; discrete.pairs.len()];
+    contact.iter().for_each(|state| state_of[state.pair] = Some(state.force));
+    let mut partial = Vec::new();
+    let subdomains = problem.subdomains.iter().zip(&solution.u).zip(problem.space.owned());
+    for ((subdomain, u), rows) in subdomains {
+        let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
+        add_body(&mut worst, subdomain, u, diagonal(&discrete.extents[subdomain.body]));
+        for &row in rows {
+            let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind else { continue };
+            if state_of[pair].is_some_and(|force| force > 0.0) {
+                add_contact(&mut worst, scene, discrete, pair, at, &of_nodes);
+            }
+        }
+        let numbers = |w: &Worst| [w.value, w.of as f64, w.place[0], w.place[1], w.place[2]];
+        partial.extend(worst.iter().flat_map(numbers));
+    }
+    let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
+    let all = problem.space.of_all(&partial, 5 * worst.len());
+    for (k, &[value, of, x, y, z]) in all.as_chunks::<5>().0.iter().enumerate() {
+        worst[k % (OF_BODIES + OF_CONTACTS)].add(value, of as usize, || [x, y, z]);
+    }
+    let found = |k: usize, name: &dyn Fn(usize) -> String| {
+        let Worst { value, of, place } = worst[k];
+        (value > 0.0 && value.is_finite()).then(|| Extreme { value, of: name(of), at: place })
+    };
+    let body = |of: usize| scene.body.keys().nth(of).cloned().unwrap_or_default();
+    let contact = |of: usize| discrete.contacts.get(of).cloned().unwrap_or_default();
+    Measures {
+        max_strain: found(0, &body),
+        max_rotation: found(1, &body),
+        max_relative_displacement: found(2, &body),
+        max_rounding: rounding(scene, discrete, &worst[..OF_BODIES]),
+        max_sliding: found(4, &contact),
+        max_closed_gap: found(5, &contact),
+    }
+}
+
+fn add_body(worst: &mut [Worst], subdomain: &Subdomain, u: &[f64], diagonal: f64) {
+    let body = subdomain.body;
+    gradients::each(subdomain, u, |element, h| {
+        let place = || {
+            let nodes = subdomain.elements.get(element);
+            let sum = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>();
+            std::array::from_fn(|a| sum(a) / nodes.len() as f64)
+        };
+        let pairs = || (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
+        let strain = pairs().map(|(i, j)| (0.5 * (h[i][j] + h[j][i])).powi(2)).sum::<f64>().sqrt();
+        let rotation = pairs().map(|(i, j)| 0.5 * (0.5 * (h[i][j] - h[j][i])).powi(2)).sum::<f64>().sqrt();
+        worst[0].add(strain, body, place);
+        worst[1].add(rotation, body, place);
+        worst[3].add(strain * diagonal, body, place);
+    });
+    for (u, &place) in u.as_chunks().0.iter().zip(&subdomain.points) {
+        worst[2].add(length(*u) / diagonal, body, || place);
+    }
+}
+
+fn add_contact(
+    worst: &mut [Worst],
+    scene: &Scene,
+    discrete: &Discrete,
+    index: usize,
+    at: At,
+    of_nodes: &HashMap<u64, [f64; 3]>,
+) {
+    let (pair, Site { place, facet }) = (&discrete.pairs[index], discrete.sites[index]);
+    let (name, contact) = scene.contact.iter().nth(pair.contact).expect("a pair belongs to a contact");
+    let masters = pair.masters.iter().map(|(node, weight)| (*node, -weight));
+    let moved = contact.displacement().map(|d| -d * obstacle_factor(scene, name, at));
+    let motion = pair.slaves.iter().copied().chain(masters).fold(moved, |sum, (node, weight)| {
+        let u = of_nodes.get(&node).copied().unwrap_or_default();
+        std::array::from_fn(|a| sum[a] + weight * u[a])
+    });
+    let along = dot(motion, pair.normal);
+    let beside: [f64; 3] = std::array::from_fn(|a| motion[a] - along * pair.normal[a]);
+    let body = discrete.bodies.partition_point(|body| body.first_node <= pair.slave) - 1;
+    worst[4].add(length(beside) / facet, pair.contact, || place);
+    worst[5].add(pair.gap / diagonal(&discrete.extents[body]), pair.contact, || place);
+}
+
+/// How much of an obstacle's displacement there is.
+fn obstacle_factor(scene: &Scene, name: &str, at: At) -> f64 {
+    let end = scene.steps()[at.stage].of_contact(name);
+    if scene.step.is_empty() {
+        return end;
+    }
+    let begin = at.stage.checked_sub(1).map_or(0.0, |before| scene.steps()[before].of_contact(name));
+    begin + at.fraction * (end - begin)
+}
+
+/// Displacements of the nodes on surfaces in contact, those of the first subdomain that has them. Collective.
+fn displacements(comm: &dyn Comm, discrete: &Discrete, u: &Torn) -> HashMap<u64, [f64; 3]> {
+    let mut mine = Vec::new();
+    for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(u) {
+        let facets = subdomain.facets.iter().filter(|facet| discrete.touching.contains(&facet.surface));
+        let nodes: BTreeSet<u32> = facets.flat_map(|facet| facet.nodes.iter().copied()).collect();
+        for node in nodes.into_iter().map(|node| node as usize) {
+            mine.push(subdomain.nodes[node]);
+            mine.extend(u[3 * node..3 * node + 3].iter().map(|x| x.to_bits()));
+        }
+    }
+    let mut found = HashMap::new();
+    for &[node, x, y, z] in all_gather_u64(comm, &mine).as_chunks::<4>().0 {
+        found.entry(node).or_insert([x, y, z].map(f64::from_bits));
+    }
+    found
+}
+
+/// Share of what bodies are strained by that the rounding of coordinates is; contacts alone see it.
+fn rounding(scene: &Scene, discrete: &Discrete, of_bodies: &[Worst]) -> Option<Extreme> {
+    let coordinates = discrete.extents.iter().flatten().flatten();
+    let farthest = coordinates.fold(0.0_f64, |farthest, x| farthest.max(x.abs()));
+    let Worst { value: stretch, of, place } = of_bodies[3];
+    let is_strained = of_bodies[0].value > NO_STRAIN && stretch.is_finite() && !discrete.pairs.is_empty();
+    let name = || scene.body.keys().nth(of).cloned().unwrap_or_default();
+    is_strained.then(|| Extreme { value: f64::EPSILON * farthest / stretch, of: name(), at: place })
+}
+
+/// What to tell of measures beyond their limits, of the increments that converged: the worst of each.
+pub(super) fn warnings(scene: &Scene, rows: &[StepRow]) -> Vec<String> {
+    type Of = fn(&Measures) -> &Option<Extreme>;
+    let to_begin_nearer = "start with the bodies nearer to where they end";
+    let tell = |of: Of, limit: f64, what: &str, consequence: &dyn Fn(f64) -> String| {
+        let reached = rows.iter().filter(|row| row.converged);
+        let found = reached.filter_map(|row| Some((row, of(&row.state.measures).as_ref()?)));
+        let (row, Extreme { value, of, at }) = found.reduce(|a, b| if b.1.value > a.1.value { b } else { a })?;
+        let when = if scene.step.is_empty() { String::new() } else { format!(" at time {}", short(row.time)) };
+        let (reached, place) = (short(*value), shown(*at));
+        let text = || {
+            let consequence = consequence(*value);
+            format!(
+                "{what} {of} reaches {reached} near {place}{when}, more than the theory allows ({limit}): {consequence}"
+            )
+        };
+        (*value > limit).then(text)
+    };
+    let told = [
+        tell(|m| &m.max_strain, STRAIN, "the strain of body", &|strain| {
+            format!("stresses there are off by about {} of themselves; loads are too large", short(0.5 * strain))
+        }),
+        tell(|m| &m.max_rotation, ROTATION, "the rotation (radians) of body", &|angle| {
+            format!("what is left out is a strain of about {} there; loads are too large", short(0.5 * angle * angle))
+        }),
+        tell(|m| &m.max_relative_displacement, DISPLACEMENT, "the displacement, in its sizes, of body", &|_| {
+            format!("loads and contacts stay where they were; {to_begin_nearer}")
+        }),
+        tell(|m| &m.max_sliding, SLIDING, "the sliding, in edges of facets, in contact", &|_| {
+            format!("nodes press on what they faced before; {to_begin_nearer}")
+        }),
+        tell(|m| &m.max_closed_gap, CLOSED_GAP, "the gap that closes, in sizes of its body, in contact", &|_| {
+            format!("normals and partners are those of before; {to_begin_nearer}")
+        }),
+        tell(
+            |m| &m.max_rounding,
+            ROUNDING,
+            "the rounding of coordinates, as a share of what strains it, of body",
+            &|_| "gaps are rounded as coordinates are; move the scene nearer to the origin".to_owned(),
+        ),
+    ];
+    told.into_iter().flatten().collect()
+}
+
+/// A number with four digits.
+fn short(x: f64) -> String {
+    format!("{x:.3e}").parse::<f64>().map_or_else(|_| x.to_string(), |x| x.to_string())
+}
+
+fn shown(place: [f64; 3]) -> String {
+    format!("[{}]", place.map(short).join(", "))
+}
+
+#[cfg(test)]
+mod tests;
