@@ -159,7 +159,8 @@ impl Scene {
     pub fn steps(&self) -> &[Step] {
         match self.step.is_empty() {
             false => &self.step,
-            true if self.has_limit_load() => &step::AT_MOST,
+            // Overlaps and prescribed displacements are there from the beginning: half of the loads is less only where there are loads.
+            true if self.has_limit_load() && !self.load.is_empty() => &step::AT_MOST,
             true => &step::AT_ONCE,
         }
     }
