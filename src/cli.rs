@@ -8,6 +8,7 @@ mod conduct;
 pub mod keeper;
 mod resume;
 mod solve;
+mod values;
 mod verify;
 
 use std::path::{Path, PathBuf};
@@ -70,10 +71,10 @@ pub struct Source {
     #[arg(default_value = "two-blocks")]
     pub scene: String,
     /// Refinement: this many times the cells along each edge of every brick.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = values::level, allow_negative_numbers = true)]
     pub level: usize,
     /// Change a key of the scene, for example decomposition.subdomains=48; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = values::change)]
     pub sets: Vec<String>,
     /// Write a summary of the run as JSON.
     #[arg(long, value_name = "FILE")]

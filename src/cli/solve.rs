@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::conduct::Conduct;
 use super::keeper::{Keeper, Signals};
 use super::resume::{labels, unfit};
-use super::{Failure, Found, Source, describe_run, find, run_name, warnings};
+use super::{Failure, Found, Source, describe_run, find, run_name, values, warnings};
 use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
@@ -25,7 +25,7 @@ use crate::results::checkpoint::{self, Checkpoint};
 use crate::results::replace;
 use crate::results::summary::{CascadeRow, CommunicationRow, Summary};
 use crate::results::vtkhdf;
-use crate::scene::Scene;
+use crate::scene::{Preconditioner, Qp, Scene};
 use crate::study::checkpoint::{Unfit, pack, unpack};
 use crate::study::{self, Begin, StudyError};
 
@@ -38,13 +38,13 @@ pub struct Solve {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Solver of the quadratic programs: smalse-m or active-set. Short for --set solver.qp=...
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = values::name::<Qp>)]
     qp: Option<String>,
     /// none, lumped or dirichlet. Short for --set solver.preconditioner=...
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = values::name::<Preconditioner>)]
     preconditioner: Option<String>,
     /// Stop when the algebraic error is at most this share of the discretisation error. Short for --set solver.accuracy=...
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = values::accuracy, allow_negative_numbers = true)]
     accuracy: Option<String>,
     /// Solve half the level first, and so on, and start from there: auto (where it pays), on or off.
     #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
