@@ -7,7 +7,7 @@ use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
-use crate::results::replace;
+use crate::results::replace::{self, Form};
 use crate::results::summary::Summary;
 use crate::study::{self, StudyError};
 
@@ -27,7 +27,7 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
     let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
     let scene = find(source, comm)?.at_level(source.level, &source.sets)?;
     if let Some(file) = &source.summary {
-        replace::probe(comm, file).map_err(Failure::Place)?;
+        replace::probe(comm, file, Form::Text).map_err(Failure::Place)?;
     }
     let discrete = study::discretise(&scene, comm)?;
     study::held(&scene, &discrete, comm)?;

@@ -22,7 +22,7 @@ use crate::monitor::trace;
 use crate::results::OutputError;
 use crate::results::agree::agree;
 use crate::results::checkpoint::{self, Checkpoint};
-use crate::results::replace;
+use crate::results::replace::{self, Form};
 use crate::results::summary::{CascadeRow, CommunicationRow, Summary};
 use crate::results::vtkhdf;
 use crate::scene::{Preconditioner, Qp, Scene};
@@ -148,9 +148,13 @@ pub(super) fn carry_out(
     let name = run_name(&plan.source);
     let result = out.join(format!("{name}.vtkhdf"));
     let summary_file = plan.source.summary.clone().unwrap_or_else(|| out.join(format!("{name}.json")));
+    let kept = out.join(format!("{name}.checkpoint.h5"));
     let traced = trace.as_deref().map(|directory| trace::file(directory, 0));
-    for file in [&result, &summary_file].into_iter().chain(&traced) {
-        replace::probe(comm, file).map_err(Failure::Place)?;
+    let before = checkpoint::previous(&kept);
+    let fields = [&result, &kept, &before].map(|file| (file, Form::Hdf5));
+    let texts = [&summary_file].into_iter().chain(&traced).map(|file| (file, Form::Text));
+    for (file, form) in fields.into_iter().chain(texts) {
+        replace::probe(comm, file, form).map_err(Failure::Place)?;
     }
     if let Some(file) = &log_json {
         let refused = |reason: String| Failure::Place(OutputError::Write { path: file.clone(), reason });
@@ -158,7 +162,7 @@ pub(super) fn carry_out(
         let log = agree(comm, "creating the log", log).map_err(refused)?;
         log.into_iter().for_each(|log| monitor.add(log));
     }
-    let keeper = Keeper::new(comm, timer, checkpoints, signals, out.join(format!("{name}.checkpoint.h5")));
+    let keeper = Keeper::new(comm, timer, checkpoints, signals, kept);
     let run = Run { comm, timer, keeper: &keeper, scene: scene.to_toml() };
 
     let mut coarser: Option<(study::Discrete, study::Solved)> = None;

@@ -6,7 +6,8 @@ use clap::Args;
 
 use super::Failure;
 use crate::comm::Comm;
-use crate::results::{replace, write_json};
+use crate::results::replace::{self, Form};
+use crate::results::write_json;
 use crate::scene::Element;
 use crate::verify::{self, Measured, Report};
 
@@ -42,7 +43,7 @@ fn element(text: &str) -> Result<Element, String> {
 /// If the summary cannot be written, or a case is no sound scene.
 pub fn verify(arguments: &Verify, comm: &dyn Comm) -> Result<i32, Failure> {
     if let Some(file) = &arguments.summary {
-        replace::probe(comm, file).map_err(Failure::Place)?;
+        replace::probe(comm, file, Form::Text).map_err(Failure::Place)?;
     }
     let mut report = Report { cases: Vec::new(), passed: true };
     for case in verify::select(&arguments.cases).unwrap_or_default() {
