@@ -23,7 +23,8 @@ pub use self::resume::{Resume, resume};
 pub use self::solve::{Cascade, Solve, solve};
 pub use self::verify::{Verify, verify};
 use crate::bodies::MeshError;
-use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use crate::comm::{Comm, Shares, decide, maximum, ordered_sum};
+use crate::monitor::stdout;
 use crate::monitor::timing::peak_rss_mb;
 use crate::results::OutputError;
 use crate::results::agree::root_texts;
@@ -99,14 +100,24 @@ pub enum Failure {
     /// Results cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// Standard output cannot be written; [`stdout::failure`] of rank 0 has the reason.
+    #[error("cannot write to standard output{}", path.as_ref().map_or(String::new(), |path| resumable(path)))]
+    Mute {
+        /// The checkpoint, if there was something to keep.
+        path: Option<PathBuf>,
+    },
     /// Somebody, or the clock, asked to stop.
-    #[error("{reason}; go on with: fetiplast resume {}", path.display())]
+    #[error("{reason}{}", resumable(path))]
     Stopped {
         /// Who.
         reason: String,
         /// The checkpoint.
         path: PathBuf,
     },
+}
+
+fn resumable(path: &Path) -> String {
+    format!("; go on with: fetiplast resume {}", path.display())
 }
 
 impl Failure {
@@ -117,7 +128,7 @@ impl Failure {
                 74
             }
             Self::Scene(_) | Self::Study(_) => 65,
-            Self::Input(_) | Self::Place(_) | Self::Output(_) => 74,
+            Self::Input(_) | Self::Place(_) | Self::Output(_) | Self::Mute { .. } => 74,
             Self::Stopped { .. } => 75,
         }
     }
@@ -127,15 +138,21 @@ impl Failure {
 /// Collective.
 ///
 /// # Errors
-/// If the scene is bad or files cannot be read or written: on every rank.
+/// If the scene is bad or files cannot be read or written, or rank 0's standard output: on every rank.
 pub fn run(command: Command, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
-    match command {
+    let code = match command {
         Command::Solve(arguments) => solve(arguments, comm, signals),
         Command::Resume(arguments) => resume(arguments, comm, signals),
         Command::Check(arguments) => check(&arguments, comm),
         Command::Verify(arguments) => verify(&arguments, comm),
         Command::Scenes | Command::Show { .. } => Ok(0),
-    }
+    }?;
+    if is_mute(comm) { Err(Failure::Mute { path: None }) } else { Ok(code) }
+}
+
+/// Whether rank 0 can tell nothing any more. Collective.
+fn is_mute(comm: &dyn Comm) -> bool {
+    decide(comm, stdout::failure().is_some())
 }
 
 impl Command {

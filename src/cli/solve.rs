@@ -200,6 +200,8 @@ pub(super) fn carry_out(
     }
     let (discrete, mut solved) = run.level(&mut plan, scene, coarser, checkpoint, &mut monitor)?;
     timer.time("output", || vtkhdf::write(comm, &result, &solved.piece, &solved.records))?;
+    // What is left is little, or waits for who reads it.
+    keeper.end_at_once();
 
     let table = PhaseTable::gather(comm, timer);
     let summary = &mut solved.summary;
@@ -292,10 +294,7 @@ impl Run<'_> {
         };
         let solved = study::solve_from(scene, &discrete, comm, begin, timer, &mut |event| tell(event), &pause);
         match (solved, keeper.end()) {
-            (Err(StudyError::Stopped), Some(Ok(reason))) => {
-                Err(Failure::Stopped { reason, path: keeper.path().to_owned() })
-            }
-            (Err(StudyError::Stopped), Some(Err(error))) => Err(Failure::Output(error)),
+            (Err(StudyError::Stopped), Some(end)) => Err(end.into()),
             (solved, _) => Ok((discrete, solved?)),
         }
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Failure;
+use super::{Failure, is_mute};
 use crate::comm::Comm;
 use crate::results::replace::{self, Form};
 use crate::results::write_json;
@@ -51,6 +51,9 @@ pub fn verify(arguments: &Verify, comm: &dyn Comm) -> Result<i32, Failure> {
         let wanted = |element: &Element| {
             arguments.element.is_none_or(|only| only == *element) && !case.levels(*element).is_empty()
         };
+        if is_mute(comm) {
+            return Err(Failure::Mute { path: None });
+        }
         for (index, element) in verify::ELEMENTS.into_iter().filter(wanted).enumerate() {
             let mut tell = |measured: &Measured| {
                 if index == 0 && measured.rows.len() == 1 {

@@ -9,6 +9,7 @@ mod checkpoint;
 mod common;
 mod elements;
 mod faults;
+mod files;
 mod fuzz;
 mod gmsh;
 mod hard;
