@@ -9,6 +9,7 @@ pub mod keeper;
 mod resume;
 mod room;
 mod solve;
+mod values;
 mod verify;
 
 use std::path::{Path, PathBuf};
@@ -23,8 +24,9 @@ pub use self::resume::{Resume, resume};
 pub use self::solve::{Cascade, Solve, solve};
 pub use self::verify::{Verify, verify};
 use crate::bodies::MeshError;
-use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use crate::comm::{Comm, Shares, decide, maximum, ordered_sum};
 use crate::heap::EXIT_MEMORY;
+use crate::monitor::stdout;
 use crate::monitor::timing::peak_rss_mb;
 use crate::results::OutputError;
 use crate::results::agree::root_texts;
@@ -72,10 +74,10 @@ pub struct Source {
     #[arg(default_value = "two-blocks")]
     pub scene: String,
     /// Refinement: this many times the cells along each edge of every brick.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = values::level, allow_negative_numbers = true)]
     pub level: usize,
     /// Change a key of the scene, for example decomposition.subdomains=48; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = values::change)]
     pub sets: Vec<String>,
     /// Write a summary of the run as JSON.
     #[arg(long, value_name = "FILE")]
@@ -103,14 +105,24 @@ pub enum Failure {
     /// The machine has not enough memory.
     #[error("{0}")]
     Memory(String),
+    /// Standard output cannot be written; [`stdout::failure`] of rank 0 has the reason.
+    #[error("cannot write to standard output{}", path.as_ref().map_or(String::new(), |path| resumable(path)))]
+    Mute {
+        /// The checkpoint, if there was something to keep.
+        path: Option<PathBuf>,
+    },
     /// Somebody, or the clock, asked to stop.
-    #[error("{reason}; go on with: fetiplast resume {}", path.display())]
+    #[error("{reason}{}", resumable(path))]
     Stopped {
         /// Who.
         reason: String,
         /// The checkpoint.
         path: PathBuf,
     },
+}
+
+fn resumable(path: &Path) -> String {
+    format!("; go on with: fetiplast resume {}", path.display())
 }
 
 impl Failure {
@@ -121,7 +133,7 @@ impl Failure {
                 74
             }
             Self::Scene(_) | Self::Study(_) => 65,
-            Self::Input(_) | Self::Place(_) | Self::Output(_) => 74,
+            Self::Input(_) | Self::Place(_) | Self::Output(_) | Self::Mute { .. } => 74,
             Self::Memory(_) => EXIT_MEMORY,
             Self::Stopped { .. } => 75,
         }
@@ -132,15 +144,21 @@ impl Failure {
 /// Collective.
 ///
 /// # Errors
-/// If the scene is bad or files cannot be read or written: on every rank.
+/// If the scene is bad or files cannot be read or written, or rank 0's standard output: on every rank.
 pub fn run(command: Command, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
-    match command {
+    let code = match command {
         Command::Solve(arguments) => solve(arguments, comm, signals),
         Command::Resume(arguments) => resume(arguments, comm, signals),
         Command::Check(arguments) => check(&arguments, comm),
         Command::Verify(arguments) => verify(&arguments, comm),
         Command::Scenes | Command::Show { .. } => Ok(0),
-    }
+    }?;
+    if is_mute(comm) { Err(Failure::Mute { path: None }) } else { Ok(code) }
+}
+
+/// Whether rank 0 can tell nothing any more. Collective.
+fn is_mute(comm: &dyn Comm) -> bool {
+    decide(comm, stdout::failure().is_some())
 }
 
 impl Command {

@@ -8,7 +8,7 @@ use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
-use crate::results::replace;
+use crate::results::replace::{self, Form};
 use crate::results::summary::{ContactRow, Sizes, Summary};
 use crate::scene::Scene;
 use crate::study::counts::Counted;
@@ -34,7 +34,7 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
     let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
     let scene = find(source, comm)?.at_level(source.level, &source.sets)?;
     if let Some(file) = &source.summary {
-        replace::probe(comm, file).map_err(Failure::Place)?;
+        replace::probe(comm, file, Form::Text).map_err(Failure::Place)?;
     }
     let found = match Counted::new(&scene).filter(|counted| counted.tetrahedra() > BUILT) {
         Some(counted) => Found::from_counts(&scene, &counted, comm)?,

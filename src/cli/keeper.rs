@@ -1,19 +1,23 @@
 //! When a run writes checkpoints, and when it stops: on a signal, or before its time is over.
 //!
-//! Signals only raise a flag, which is looked at between Newton steps. The ranks decide together: one that has seen a signal
-//! stops them all, rank 0 watches the clock.
+//! From the first Newton step until results are written a signal only raises a flag, which is looked at between steps. The ranks
+//! decide together: one that has seen a signal stops them all, rank 0 watches the clock and the log. Before and after that there
+//! is nothing that a checkpoint could keep, and SIGTERM ends the process at once, as it does without us; the launcher ends the
+//! other ranks.
 
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use signal_hook::consts::{SIGTERM, SIGUSR1};
 use signal_hook::flag;
 
+use super::Failure;
 use crate::comm::{Comm, maximum};
+use crate::monitor::stdout;
 use crate::monitor::timing::Timer;
 use crate::results::OutputError;
 
@@ -50,26 +54,35 @@ fn time(text: &str) -> Result<Duration, String> {
 
 /// The signals that ask a run to stop.
 #[derive(Clone, Debug, Default)]
-pub struct Signals(Arc<AtomicUsize>);
+pub struct Signals {
+    /// Number of the last one, from 1; 0 if there was none.
+    seen: Arc<AtomicUsize>,
+    /// Whether SIGTERM ends the process at once.
+    fatal: Arc<AtomicBool>,
+}
 
 const STOPPING: [(i32, &str); 2] = [(SIGUSR1, "SIGUSR1"), (SIGTERM, "SIGTERM")];
 
 impl Signals {
-    /// From now on such a signal does not end the process; it is remembered.
+    /// From now on such signals are remembered; but until a keeper says otherwise SIGTERM ends the process at once.
     ///
     /// # Errors
     /// If the system refuses.
     pub fn catch() -> std::io::Result<Self> {
-        let seen = Arc::new(AtomicUsize::new(0));
+        let signals = Self::default();
+        signals.end_at_once(true);
         for (index, (signal, _)) in STOPPING.iter().enumerate() {
-            flag::register_usize(*signal, Arc::clone(&seen), index + 1)?;
+            // Open MPI's launcher may hang where a rank dies of a signal that it passes on, as it does SIGUSR1.
+            if *signal == SIGTERM {
+                flag::register_conditional_default(*signal, Arc::clone(&signals.fatal))?;
+            }
+            flag::register_usize(*signal, Arc::clone(&signals.seen), index + 1)?;
         }
-        Ok(Self(seen))
+        Ok(signals)
     }
 
-    /// Number of the last one, from 1; 0 if there was none.
-    fn seen(&self) -> usize {
-        self.0.load(Ordering::Relaxed)
+    fn end_at_once(&self, fatal: bool) {
+        self.fatal.store(fatal, Ordering::Relaxed);
     }
 }
 
@@ -80,6 +93,29 @@ enum Due {
     Checkpoint,
     /// A checkpoint, and then the end, for this reason.
     Stop(String),
+    /// The same, for nobody can read the log.
+    Mute,
+}
+
+/// How a run ended before its time.
+#[derive(Clone, Debug, PartialEq)]
+pub enum End {
+    /// For a reason, with this checkpoint.
+    Stopped(String, PathBuf),
+    /// The log cannot be written; with a checkpoint if there was something to keep.
+    Mute(Option<PathBuf>),
+    /// There should be a checkpoint, but it cannot be written.
+    Lost(OutputError),
+}
+
+impl From<End> for Failure {
+    fn from(end: End) -> Self {
+        match end {
+            End::Stopped(reason, path) => Self::Stopped { reason, path },
+            End::Mute(path) => Self::Mute { path },
+            End::Lost(error) => Self::Output(error),
+        }
+    }
 }
 
 /// Decides over checkpoints, and remembers what became of them.
@@ -97,7 +133,7 @@ pub struct Keeper<'a> {
     /// How long the longest checkpoint took.
     writing: Cell<Duration>,
     /// Why the run ends here.
-    end: RefCell<Option<Result<String, OutputError>>>,
+    end: RefCell<Option<End>>,
 }
 
 impl<'a> Keeper<'a> {
@@ -117,17 +153,18 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// Where checkpoints are.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Lets `write` write a checkpoint if it is time; whether the run has to end here, which [`Keeper::end`] explains. Where it
     /// need not end, a checkpoint that cannot be written is told to `warn`. Collective.
     pub fn pause(&self, write: impl FnOnce(&Path) -> Result<(), OutputError>, warn: impl FnOnce(String)) -> bool {
+        self.signals.end_at_once(false);
+        let is_first = self.asked.get().is_none();
         let due = self.due();
         if due == Due::Nothing {
             return false;
+        }
+        if due == Due::Mute && is_first {
+            self.end.replace(Some(End::Mute(None)));
+            return true;
         }
         let begin = Instant::now();
         let outcome = self.timer.time("checkpoints", || write(&self.path));
@@ -135,7 +172,9 @@ impl<'a> Keeper<'a> {
         self.asked.set(Some(Instant::now()));
         self.writing.set(self.writing.get().max(begin.elapsed()));
         let end = match (outcome, due) {
-            (outcome, Due::Stop(reason)) => Some(outcome.map(|()| reason)),
+            (Ok(()), Due::Stop(reason)) => Some(End::Stopped(reason, self.path.clone())),
+            (Ok(()), Due::Mute) => Some(End::Mute(Some(self.path.clone()))),
+            (Err(error), Due::Stop(_) | Due::Mute) => Some(End::Lost(error)),
             (Err(error), _) => {
                 warn(format!("going on without a new checkpoint: {error}"));
                 None
@@ -147,9 +186,14 @@ impl<'a> Keeper<'a> {
         ends
     }
 
-    /// Why the run ended: a reason that left a checkpoint, or that there is none.
-    pub fn end(&self) -> Option<Result<String, OutputError>> {
+    /// Why the run ended.
+    pub fn end(&self) -> Option<End> {
         self.end.borrow().clone()
+    }
+
+    /// Nothing is left that a checkpoint could keep.
+    pub fn end_at_once(&self) {
+        self.signals.end_at_once(true);
     }
 
     fn due(&self) -> Due {
@@ -166,10 +210,13 @@ impl<'a> Keeper<'a> {
         let is_late = before.is_some()
             && time_limit.is_some_and(|limit| passed + self.longest.get() + 2 * self.writing.get() >= limit);
         let is_old = checkpoint_every.is_some_and(|pause| self.written.get().elapsed() >= pause);
-        let mine = [self.signals.seen() as f64, f64::from(first && is_late), f64::from(first && is_old)];
+        let is_mute = stdout::failure().is_some();
+        let signal = self.signals.seen.load(Ordering::Relaxed) as f64;
+        let mine = [signal, f64::from(first && is_mute), f64::from(first && is_late), f64::from(first && is_old)];
         match &maximum(self.comm, &mine)[..] {
+            [_, mute, ..] if *mute > 0.0 => Due::Mute,
             [signal, ..] if *signal > 0.0 => Due::Stop(format!("stopped by {}", STOPPING[*signal as usize - 1].1)),
-            [_, late, _] if *late > 0.0 => Due::Stop("stopped before the time limit".into()),
+            [_, _, late, _] if *late > 0.0 => Due::Stop("stopped before the time limit".into()),
             [.., old] if *old > 0.0 => Due::Checkpoint,
             _ => Due::Nothing,
         }
@@ -205,12 +252,12 @@ mod tests {
             let keeper = Keeper::new(comm, &timer, Checkpoints::default(), signals.clone(), "there".into());
             assert!(!keeper.pause(|_| panic!("nothing is due"), |_| ()));
             if comm.rank() == 1 {
-                signals.0.store(2, Ordering::Relaxed);
+                signals.seen.store(2, Ordering::Relaxed);
             }
             assert!(keeper.pause(|_| Ok(()), |_| ()));
             keeper.end()
         });
-        assert!(ends.into_iter().all(|end| end == Some(Ok("stopped by SIGTERM".into()))));
+        assert!(ends.into_iter().all(|end| end == Some(End::Stopped("stopped by SIGTERM".into(), "there".into()))));
     }
 
     #[test]
@@ -234,7 +281,7 @@ mod tests {
         let late = keeper(options(3_600_000, 1));
         assert!(!late.pause(write, warn), "one step is done however little time there is");
         assert!(late.pause(write, warn));
-        assert_eq!(late.end(), Some(Ok("stopped before the time limit".into())));
+        assert_eq!(late.end(), Some(End::Stopped("stopped before the time limit".into(), "there".into())));
     }
 
     #[test]
@@ -247,8 +294,8 @@ mod tests {
         let pause = || keeper.pause(|_| Err(error.clone()), |text| *told.borrow_mut() = text);
         assert!(!pause() && keeper.end().is_none());
         assert!(told.take().starts_with("going on without a new checkpoint: cannot write there: full"));
-        signals.0.store(1, Ordering::Relaxed);
+        signals.seen.store(1, Ordering::Relaxed);
         assert!(pause() && told.take().is_empty());
-        assert_eq!(keeper.end(), Some(Err(error)));
+        assert_eq!(keeper.end(), Some(End::Lost(error)));
     }
 }

@@ -10,7 +10,7 @@ use clap::Args;
 use super::conduct::Conduct;
 use super::keeper::Signals;
 use super::solve::{Plan, Setting, carry_out};
-use super::{Failure, find};
+use super::{Failure, find, values};
 use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
@@ -29,7 +29,7 @@ pub struct Resume {
     file: PathBuf,
     /// Cut bodies otherwise from here on, for example decomposition.subdomains=96; may be repeated. Other keys of the scene
     /// stay.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = values::change)]
     sets: Vec<String>,
     /// Where results go, if not beside the checkpoint.
     #[arg(long, value_name = "DIR")]

@@ -11,7 +11,7 @@ use super::conduct::Conduct;
 use super::keeper::{Keeper, Signals};
 use super::resume::{labels, unfit};
 use super::room::Room;
-use super::{Failure, Found, Source, describe_run, find, run_name, warnings};
+use super::{Failure, Found, Source, describe_run, find, run_name, values, warnings};
 use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
@@ -23,10 +23,10 @@ use crate::monitor::trace;
 use crate::results::OutputError;
 use crate::results::agree::agree;
 use crate::results::checkpoint::{self, Checkpoint};
-use crate::results::replace;
+use crate::results::replace::{self, Form};
 use crate::results::summary::{CascadeRow, CommunicationRow, Summary};
 use crate::results::vtkhdf;
-use crate::scene::Scene;
+use crate::scene::{Preconditioner, Qp, Scene};
 use crate::study::checkpoint::{Unfit, pack, unpack};
 use crate::study::counts::Counted;
 use crate::study::{self, Begin, StudyError};
@@ -40,13 +40,13 @@ pub struct Solve {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Solver of the quadratic programs: smalse-m or active-set. Short for --set solver.qp=...
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = values::name::<Qp>)]
     qp: Option<String>,
     /// none, lumped or dirichlet. Short for --set solver.preconditioner=...
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = values::name::<Preconditioner>)]
     preconditioner: Option<String>,
     /// Stop when the algebraic error is at most this share of the discretisation error. Short for --set solver.accuracy=...
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = values::accuracy, allow_negative_numbers = true)]
     accuracy: Option<String>,
     /// Solve half the level first, and so on, and start from there: auto (where it pays), on or off.
     #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
@@ -153,9 +153,13 @@ pub(super) fn carry_out(
     let name = run_name(&plan.source);
     let result = out.join(format!("{name}.vtkhdf"));
     let summary_file = plan.source.summary.clone().unwrap_or_else(|| out.join(format!("{name}.json")));
+    let kept = out.join(format!("{name}.checkpoint.h5"));
     let traced = trace.as_deref().map(|directory| trace::file(directory, 0));
-    for file in [&result, &summary_file].into_iter().chain(&traced) {
-        replace::probe(comm, file).map_err(Failure::Place)?;
+    let before = checkpoint::previous(&kept);
+    let fields = [&result, &kept, &before].map(|file| (file, Form::Hdf5));
+    let texts = [&summary_file].into_iter().chain(&traced).map(|file| (file, Form::Text));
+    for (file, form) in fields.into_iter().chain(texts) {
+        replace::probe(comm, file, form).map_err(Failure::Place)?;
     }
     if let Some(file) = &log_json {
         let refused = |reason: String| Failure::Place(OutputError::Write { path: file.clone(), reason });
@@ -163,7 +167,7 @@ pub(super) fn carry_out(
         let log = agree(comm, "creating the log", log).map_err(refused)?;
         log.into_iter().for_each(|log| monitor.add(log));
     }
-    let keeper = Keeper::new(comm, timer, checkpoints, signals, out.join(format!("{name}.checkpoint.h5")));
+    let keeper = Keeper::new(comm, timer, checkpoints, signals, kept);
     let run = Run { comm, timer, keeper: &keeper, scene: scene.to_toml(), ignore_memory };
 
     let mut coarser: Option<(study::Discrete, study::Solved)> = None;
@@ -201,6 +205,8 @@ pub(super) fn carry_out(
     }
     let (discrete, mut solved) = run.level(&mut plan, scene, coarser, checkpoint, &mut monitor)?;
     timer.time("output", || vtkhdf::write(comm, &result, &solved.piece, &solved.records))?;
+    // What is left is little, or waits for who reads it.
+    keeper.end_at_once();
 
     let table = PhaseTable::gather(comm, timer);
     let summary = &mut solved.summary;
@@ -313,10 +319,7 @@ impl Run<'_> {
         };
         let solved = study::solve_from(scene, &discrete, comm, begin, timer, &mut |event| tell(event), &pause);
         match (solved, keeper.end()) {
-            (Err(StudyError::Stopped), Some(Ok(reason))) => {
-                Err(Failure::Stopped { reason, path: keeper.path().to_owned() })
-            }
-            (Err(StudyError::Stopped), Some(Err(error))) => Err(Failure::Output(error)),
+            (Err(StudyError::Stopped), Some(end)) => Err(end.into()),
             (solved, _) => Ok((discrete, solved?)),
         }
     }

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Failure;
+use super::{Failure, is_mute};
 use crate::comm::Comm;
-use crate::results::{replace, write_json};
+use crate::results::replace::{self, Form};
+use crate::results::write_json;
 use crate::scene::Element;
 use crate::verify::{self, Measured, Report};
 
@@ -42,7 +43,7 @@ fn element(text: &str) -> Result<Element, String> {
 /// If the summary cannot be written, or a case is no sound scene.
 pub fn verify(arguments: &Verify, comm: &dyn Comm) -> Result<i32, Failure> {
     if let Some(file) = &arguments.summary {
-        replace::probe(comm, file).map_err(Failure::Place)?;
+        replace::probe(comm, file, Form::Text).map_err(Failure::Place)?;
     }
     let mut report = Report { cases: Vec::new(), passed: true };
     for case in verify::select(&arguments.cases).unwrap_or_default() {
@@ -50,6 +51,9 @@ pub fn verify(arguments: &Verify, comm: &dyn Comm) -> Result<i32, Failure> {
         let wanted = |element: &Element| {
             arguments.element.is_none_or(|only| only == *element) && !case.levels(*element).is_empty()
         };
+        if is_mute(comm) {
+            return Err(Failure::Mute { path: None });
+        }
         for (index, element) in verify::ELEMENTS.into_iter().filter(wanted).enumerate() {
             let mut tell = |measured: &Measured| {
                 if index == 0 && measured.rows.len() == 1 {

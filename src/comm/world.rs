@@ -1,5 +1,7 @@
 //! MPI processes, through rsmpi.
 
+use std::io::Write;
+
 use mpi::collective::{CommunicatorCollectives, Root};
 use mpi::datatype::{Partition, PartitionMut};
 use mpi::environment::Universe;
@@ -28,7 +30,9 @@ impl World {
         let rank = world.rank();
         let report = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
-            eprintln!("fetiplast: internal error on rank {rank}; please report it");
+            // A closed stream leaves nobody to tell.
+            let message = format!("fetiplast: internal error on rank {rank}; please report it\n");
+            let _ = std::io::stderr().write_all(message.as_bytes());
             report(info);
             // Safety: MPI is up; aborting from any thread is what MPI_Abort is for.
             unsafe { mpi::ffi::MPI_Abort(mpi::ffi::RSMPI_COMM_WORLD, EXIT_BUG) };

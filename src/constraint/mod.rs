@@ -97,12 +97,15 @@ impl Term {
 /// Jumps of stiffness below this change nothing.
 const JUMP: f64 = 16.0;
 
+/// Beyond this jump rows get no shorter: the coarse problem knows the squares of their lengths to sixteen digits only.
+const SOFTEST: f64 = 1e-9;
+
 impl Row {
     /// Makes a unit vector as long as the root of the stiffness it works against, relative to the largest and up to a power of
-    /// two, given that of all subdomains and the largest of these.
+    /// two and to [`SOFTEST`], given that of all subdomains and the largest of these.
     fn weigh(&mut self, stiffness: &[f64], largest: f64) {
         let flexibility: f64 = self.terms.iter().map(|t| t.value * t.value / stiffness[t.subdomain as usize]).sum();
-        let relative = 1.0 / (flexibility * largest);
+        let relative = (1.0 / (flexibility * largest)).max(SOFTEST);
         if relative * JUMP <= 1.0 {
             self.length = (0.5 * relative.log2()).round().exp2();
             self.rhs *= self.length;

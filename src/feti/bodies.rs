@@ -87,7 +87,7 @@ impl BodyMotions {
         self.clusters.iter().flat_map(of).collect()
     }
 
-    /// Motions, orthonormal, that meet no resistance in `T' blocks T`, of the lower blocks of `G G'` for some rows.
+    /// Motions, orthonormal, that meet no resistance in `T' blocks T`, of the lower blocks of `G G'` for some unit rows.
     pub fn free(&self, blocks: &Blocks) -> Vec<Vec<f64>> {
         let n = MODES * self.bodies();
         let mut gram = vec![vec![0.0; n]; n];
@@ -296,7 +296,7 @@ mod tests {
         let free = |sets: &[&str]| {
             let described = |setup: &crate::fixture::Setup| {
                 let coarse = setup.bare_coarse();
-                let free = coarse.motions().free(&coarse.blocks(|row| !setup.rows()[row].is_inequality()));
+                let free = coarse.free(|row| !setup.rows()[row].is_inequality());
                 let name = |motion: &Vec<f64>| {
                     let (body, _, motion) = coarse.motions().describe(motion);
                     format!("{body}: {motion}")

@@ -56,6 +56,9 @@ pub struct Coarse<'a> {
     /// `G G'` of the equalities, on every rank.
     equalities: OnceCell<Blocks>,
     motions: BodyMotions,
+    /// For each row what would make it a unit vector, squared; and whether that is not 1 for all.
+    unit: Vec<f64>,
+    uneven: bool,
     /// For all rows, and so for any.
     symbolic: OnceCell<Rc<Symbolic>>,
     /// Of all rows; present once the coarse problem is set up.
@@ -122,6 +125,8 @@ impl<'a> Coarse<'a> {
             motions: BodyMotions::new(comm, clusters, subdomains, modes),
             clusters: clusters.clone(),
             members,
+            unit: constraints.rows.iter().map(|row| (row.length * row.length).recip()).collect(),
+            uneven: constraints.uneven,
             slot_begin,
             slot_cluster,
             slot_modes,
@@ -138,9 +143,7 @@ impl<'a> Coarse<'a> {
     /// # Errors
     /// If it is singular: on every rank.
     pub fn factorise(&mut self) -> Result<(), Floating> {
-        let blocks = self.blocks(|_| true);
-        self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&blocks, self.clusters.total())));
-        self.factor = Some(self.factor_of(&blocks)?);
+        self.factor = Some(self.restricted(|_| true)?);
         Ok(())
     }
 
@@ -149,29 +152,48 @@ impl<'a> Coarse<'a> {
     /// # Errors
     /// If these rows leave a rigid motion free: on every rank.
     pub fn restricted(&self, kept: impl Fn(usize) -> bool) -> Result<CoarseFactor, Floating> {
-        self.factor_of(&self.blocks(kept))
+        self.factor_of(&self.blocks(&kept), || self.unit_blocks(&kept))
     }
 
-    /// The factor of blocks, which need not be those of some rows. Collective.
+    /// The factor of blocks, which need not be those of some rows. `unit` are those of unit rows, which tell, where stiffness
+    /// jumps, whether a motion is free or only held by something soft. Collective.
     ///
     /// # Errors
     /// If they are singular: on every rank.
-    pub fn factor_of(&self, blocks: &Blocks) -> Result<CoarseFactor, Floating> {
+    pub fn factor_of(&self, blocks: &Blocks, unit: impl FnOnce() -> Blocks) -> Result<CoarseFactor, Floating> {
         let clusters = self.clusters.total();
         let symbolic = self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&self.blocks(|_| true), clusters)));
         let fitting = if symbolic.holds(blocks) { symbolic } else { &Rc::new(Symbolic::new(blocks, clusters)) };
-        CoarseFactor::new(fitting, blocks).map_err(|cluster| Floating { subdomain: self.clusters.first(cluster) })
+        let factor = CoarseFactor::new(fitting, blocks);
+        let sound = factor.and_then(|factor| {
+            let checked = factor.check_rank();
+            let held = |_| CoarseFactor::new(fitting, &unit())?.check_rank();
+            if self.uneven { checked.or_else(held) } else { checked }.map(|()| factor)
+        });
+        sound.map_err(|cluster| Floating { subdomain: self.clusters.first(cluster) })
     }
 
     /// The blocks of `G G'` of the kept rows, which are all equalities and some inequalities; lower triangle, on every rank.
     /// Collective.
     pub fn blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
         let [equalities, inequalities] = &self.acting;
-        let constant = || self.products(equalities, |_| true).into_iter().collect();
+        let constant = || self.products(equalities, |_| 1.0).into_iter().collect();
         let mut blocks: Blocks = self.equalities.get_or_init(constant).clone();
-        for (place, product) in self.products(inequalities, kept) {
-            let block = blocks.entry(place).or_insert([0.0; MODES * MODES]);
-            block.iter_mut().zip(product).for_each(|(b, p)| *b += p);
+        add(&mut blocks, self.products(inequalities, |row| f64::from(kept(row))));
+        blocks
+    }
+
+    /// Rigid motions of whole bodies, orthonormal, that the kept rows, all equalities among them, leave free. They do not
+    /// depend on how long rows are. Collective.
+    pub fn free(&self, kept: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
+        self.motions.free(&self.unit_blocks(kept))
+    }
+
+    /// As [`Coarse::blocks`], were all rows unit vectors. Collective.
+    pub fn unit_blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
+        let mut blocks = Blocks::new();
+        for acting in &self.acting {
+            add(&mut blocks, self.products(acting, |row| if kept(row) { self.unit[row] } else { 0.0 }));
         }
         blocks
     }
@@ -197,19 +219,24 @@ impl<'a> Coarse<'a> {
         forces
     }
 
-    /// Blocks of `G G'` of the kept among some rows, given for each own cluster; lower triangle, those of all ranks on
-    /// every rank. Complete: every row that a subdomain takes part in is on its rank. Collective.
+    /// Blocks of `G W G'` of some rows, given for each own cluster, with the diagonal `W`; lower triangle, those of all ranks
+    /// on every rank. Complete: every row that a subdomain takes part in is on its rank. Collective.
     fn products(
         &self,
         acting: &[Vec<Acting>],
-        kept: impl Fn(usize) -> bool,
+        weight: impl Fn(usize) -> f64,
     ) -> Vec<((usize, usize), [f64; MODES * MODES])> {
         let first = self.clusters.shares.begin(self.comm.rank());
         let mut message = Vec::new();
         for (cluster, acting) in (first..).zip(acting) {
             // A cluster has few neighbours.
             let (mut columns, mut blocks): (Vec<u32>, Vec<[f64; MODES * MODES]>) = Default::default();
-            for Acting { row, modes } in acting.iter().filter(|acting| kept(acting.row as usize)) {
+            for Acting { row, modes } in acting {
+                let weight = weight(*row as usize);
+                if weight == 0.0 {
+                    continue;
+                }
+                let modes = modes.map(|g| weight * g);
                 for other in self.slots(*row as usize) {
                     let column = self.slot_cluster[other];
                     if column as usize > cluster {
@@ -313,6 +340,13 @@ impl<'a> Coarse<'a> {
             let of_slot = |slot: usize| dot(&self.slot_modes[slot], &a[self.slot_cluster[slot] as usize]);
             rows[row as usize] += factor * self.slots(row as usize).map(of_slot).sum::<f64>();
         }
+    }
+}
+
+fn add(blocks: &mut Blocks, products: Vec<((usize, usize), [f64; MODES * MODES])>) {
+    for (place, product) in products {
+        let block = blocks.entry(place).or_insert([0.0; MODES * MODES]);
+        block.iter_mut().zip(product).for_each(|(b, p)| *b += p);
     }
 }
 

@@ -4,7 +4,7 @@
 //! `P_A = I_A - G_A'(G_A G_A')^-1 G_A` onto what keeps the balance and leaves open contacts without force.
 //!
 //! These rows may leave rigid motions `N` of whole bodies free (`G_A'N = 0`). Then the first cluster of each body is
-//! tied: with `C` the rows of `N` there, `(G_A G_A' + C C')^-1` is a generalised inverse of `G_A G_A'`, exact for all
+//! tied: with `C` the rows of `N` there, scaled by body, `(G_A G_A' + C C')^-1` is a generalised inverse of `G_A G_A'`, exact for all
 //! right-hand sides orthogonal to `N`, since `N'C C'a = 0` leaves `C'a = 0`.
 
 use super::bodies::BodyMotions;
@@ -27,18 +27,20 @@ impl CoarseFace {
     /// # Errors
     /// If these rows leave a motion free that is not one of whole bodies.
     pub fn new(coarse: &Coarse, kept: Vec<bool>) -> Result<Self, Floating> {
-        let (mut blocks, motions) = (coarse.blocks(|row| kept[row]), coarse.motions());
+        let motions = coarse.motions();
         coarse
-            .factor_of(&blocks)
+            .restricted(|row| kept[row])
             .map(|factor| (factor, Vec::new()))
             .or_else(|floating| {
-                let free = motions.free(&blocks);
+                let free = coarse.free(|row| kept[row]);
                 if free.is_empty() {
                     return Err(floating);
                 }
                 let free: Vec<Vec<f64>> = free.iter().map(|motion| motions.amplitudes(motion)).collect();
-                tie(motions, &free, &mut blocks);
-                coarse.factor_of(&blocks).map(|factor| (factor, free))
+                let tied = |blocks| tied(motions, &free, blocks);
+                let factor = coarse
+                    .factor_of(&tied(coarse.blocks(|row| kept[row])), || tied(coarse.unit_blocks(|row| kept[row])));
+                factor.map(|factor| (factor, free))
             })
             .map(|(factor, free)| {
                 let dropped = (0..).zip(&kept).filter(|(_, kept)| !**kept).map(|(row, _)| row).collect();
@@ -133,28 +135,32 @@ pub(super) fn without(square: f64, e: &[f64], a: &[f64]) -> f64 {
 /// Forces along a free motion smaller than this share of all are rounding.
 const BALANCED: f64 = 1e-10;
 
-/// Adds `C C'` to the blocks, in their size.
-fn tie(motions: &BodyMotions, free: &[Vec<f64>], blocks: &mut Blocks) {
+/// Adds `C C'` to the blocks. Of `N` the rows of each body are taken in the size of what holds it; `C'N` stays regular.
+fn tied(motions: &BodyMotions, free: &[Vec<f64>], mut blocks: Blocks) -> Blocks {
     let first = motions.first_clusters();
-    let size = blocks.values().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
+    let largest = |x: &[f64]| x.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+    let any = blocks.values().map(|block| largest(block)).fold(0.0, f64::max);
+    // Nothing may hold a body.
+    let own =
+        |cluster: &usize| blocks.get(&(*cluster, *cluster)).map(|block| largest(block)).filter(|size| *size > 0.0);
+    let root = |cluster: &usize| own(cluster).unwrap_or(any).sqrt();
+    let roots: Vec<f64> = first.iter().map(root).collect();
     for motion in free {
         let of = |cluster: usize| &motion[MODES * cluster..][..MODES];
-        let largest = first.iter().flat_map(|&c| of(c)).fold(0.0_f64, |largest, x| largest.max(x.abs()));
-        let weight = size / (largest * largest);
-        for &row in &first {
-            for &column in first.iter().filter(|&&column| column <= row) {
-                if of(row).iter().all(|x| *x == 0.0) || of(column).iter().all(|x| *x == 0.0) {
-                    continue;
-                }
+        let scale = 1.0 / first.iter().map(|&cluster| largest(of(cluster))).fold(0.0, f64::max);
+        let parts = || first.iter().zip(&roots).filter(|(cluster, _)| of(**cluster).iter().any(|x| *x != 0.0));
+        for (&row, of_row) in parts() {
+            for (&column, of_column) in parts().filter(|(column, _)| **column <= row) {
                 let block = blocks.entry((row, column)).or_insert([0.0; MODES * MODES]);
                 for (i, a) in of(row).iter().enumerate() {
                     for (j, b) in of(column).iter().enumerate() {
-                        block[MODES * i + j] += weight * a * b;
+                        block[MODES * i + j] += (of_row * scale * a) * (of_column * scale * b);
                     }
                 }
             }
         }
     }
+    blocks
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::events::{Event, Sink};
+use crate::results::target;
 
 /// Writes every event but [`Event::Inner`] at once, so that whoever reads along is up to date.
 pub struct JsonLines {
@@ -25,13 +26,12 @@ struct Line<'a> {
 }
 
 impl JsonLines {
-    /// A new log, in place of an earlier one.
+    /// A new log, in place of an earlier one, or into a device or pipe.
     ///
     /// # Errors
     /// If the file or its directory cannot be made.
     pub fn create(path: &Path) -> io::Result<Self> {
-        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-        Ok(Self { started: Instant::now(), file: Some(File::create(path)?) })
+        Ok(Self { started: Instant::now(), file: Some(target::open(path)?) })
     }
 }
 

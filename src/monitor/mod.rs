@@ -1,7 +1,7 @@
 //! What a run tells while it runs: typed events on one side, sinks that show them on the other.
 //!
 //! The stages send [`events::Event`]s to a [`Monitor`]; only rank 0's shows anything. Log lines go through `tracing`, so
-//! the program decides where they end up. [`timing`] measures phases and messages, [`table`] compares them over the ranks,
+//! the program decides where they end up, as a rule on [`stdout`]. [`timing`] measures phases and messages, [`table`] compares them over the ranks,
 //! [`trace`] keeps every call.
 //! Nothing here is read back by the numerics.
 
@@ -11,6 +11,7 @@ pub mod machine;
 pub mod metered;
 pub mod plain;
 pub mod progress;
+pub mod stdout;
 pub mod table;
 pub mod timing;
 pub mod trace;

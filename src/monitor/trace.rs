@@ -1,6 +1,5 @@
 //! What every rank did when, in the format of Chrome's trace viewer, which `chrome://tracing` and Perfetto open.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
@@ -11,6 +10,7 @@ use super::timing::Timer;
 use crate::comm::Comm;
 use crate::results::OutputError;
 use crate::results::agree::agree;
+use crate::results::target;
 
 /// Where rank `rank` writes.
 pub fn file(directory: &Path, rank: usize) -> PathBuf {
@@ -32,8 +32,7 @@ pub fn write(comm: &dyn Comm, directory: &Path, timer: &Timer) -> Result<(), Out
 
 /// `offset` is added to all times, in microseconds.
 fn write_own(path: &Path, rank: usize, timer: &Timer, offset: f64) -> io::Result<()> {
-    std::fs::create_dir_all(path.parent().unwrap_or(path))?;
-    let mut file = BufWriter::new(File::create(path)?);
+    let mut file = BufWriter::new(target::open(path)?);
     let name = json!({ "name": "process_name", "ph": "M", "pid": rank, "args": { "name": format!("rank {rank}") } });
     write!(file, "{{\"displayTimeUnit\": \"ms\", \"traceEvents\": [\n{name}")?;
     for span in timer.spans() {

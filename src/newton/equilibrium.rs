@@ -47,7 +47,7 @@ pub fn check(
 ) -> Result<(), Box<Unheld>> {
     let is_contact = |row: usize| constraints.rows[row].is_inequality();
     let motions = coarse.motions();
-    let free = motions.free(&coarse.blocks(|row| !is_contact(row)));
+    let free = coarse.free(|row| !is_contact(row));
     if free.is_empty() {
         return Ok(());
     }

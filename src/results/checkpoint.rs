@@ -14,6 +14,7 @@ use super::hdf5::{Number, SharedFile};
 use super::piece::{Field, Values};
 use super::replace::replace;
 use super::seal;
+use super::target::{Target, behind_links};
 use crate::comm::{Comm, all_gather_u64};
 
 /// Writes a checkpoint, once what is there is the one before. Names of arrays and texts have the form `group/name`; rank 0's
@@ -44,7 +45,7 @@ pub fn write(comm: &dyn Comm, path: &Path, texts: &[(&str, String)], arrays: &[F
         seal::seal(comm, temporary)?;
         on_root(comm, "keeping the checkpoint before", || {
             File::open(temporary)?.sync_all()?;
-            match fs::rename(path, previous(path)) {
+            match fs::rename(behind_links(path), Target::of(&previous(path)).and_then(Target::file)?) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
                 _ => Ok(()),
             }
@@ -58,8 +59,9 @@ fn put(file: &SharedFile, Field { name, components, states }: &Field) -> Result<
     if integer.is_empty() { file.states(name, *components, &real) } else { file.states(name, *components, &integer) }
 }
 
-/// Where the checkpoint before is kept.
+/// Where the checkpoint before is kept: beside the file itself, where `path` is a link to it.
 pub fn previous(path: &Path) -> PathBuf {
+    let path = behind_links(path);
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".previous");
     path.with_file_name(name)

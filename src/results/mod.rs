@@ -1,8 +1,8 @@
 //! What a run leaves behind: the result file, the summary, and where both come from.
 //!
 //! [`vtkhdf`] writes the fields for ParaView, [`summary`] one JSON object for scripts, [`provenance`] the circumstances
-//! of the run, [`checkpoint`] what it takes to go on with it. Every file is written under a temporary name and renamed when it is complete ([`replace`]), and a failure
-//! on one rank is the same [`OutputError`] on all.
+//! of the run, [`checkpoint`] what it takes to go on with it. Every file is written under a temporary name and renamed when it is complete ([`replace`]);
+//! [`target`] tells files from devices and pipes. A failure on one rank is the same [`OutputError`] on all.
 //! It computes nothing: what is to be written comes in ready.
 
 pub mod agree;
@@ -15,9 +15,9 @@ pub mod provenance;
 pub mod replace;
 pub mod seal;
 pub mod summary;
+pub mod target;
 pub mod vtkhdf;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -55,7 +55,5 @@ pub enum OutputError {
 /// [`OutputError::Write`] if the file cannot be written; an earlier one is untouched then.
 pub fn write_json(comm: &dyn Comm, path: &Path, object: &impl Serialize) -> Result<(), OutputError> {
     let text = serde_json::to_string_pretty(object).unwrap_or_default() + "\n";
-    replace::replace(comm, path, text.len() as u64, |temporary| {
-        agree::on_root(comm, "writing the summary", || fs::write(temporary, &text))
-    })
+    replace::text(comm, path, &text)
 }

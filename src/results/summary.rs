@@ -29,7 +29,7 @@ pub struct Summary {
     pub sizes: Sizes,
     /// How contacts were paired.
     pub contacts: Vec<ContactRow>,
-    /// Share of the elements with plastic flow in the last increment, 0 to 1.
+    /// Share of the elements with plastic flow, 0 to 1, in the increment with most of them.
     pub plastic_fraction: Option<f64>,
     /// Newton steps.
     pub newton_iterations: Option<u64>,
@@ -38,7 +38,8 @@ pub struct Summary {
     /// Work done by the QP solver.
     #[serde(flatten)]
     pub counters: Counters,
-    /// The state at the end of the run.
+    /// The state at the end of the run; but plastic elements are those of the increment with most of them, as the last one may
+    /// be an unloading.
     #[serde(flatten)]
     pub state: State,
     /// Wall time of the run in seconds.
@@ -99,7 +100,7 @@ pub struct CommunicationRow {
 /// dissipates or stores by hardening.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// Elements with plastic flow in the last increment.
+    /// Elements with plastic flow in the increment.
     pub plastic_elements: Option<u64>,
     /// Contact pairs that transmit pressure.
     pub active_contacts: Option<u64>,

@@ -42,7 +42,7 @@ pub use initial::Initial;
 pub use load::Load;
 pub use mapped::{Cylinder, Grid, Sphere};
 pub use material::Material;
-pub use overrides::recut;
+pub use overrides::{recut, well_formed};
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
 pub use step::Step;
 pub use surface::{Face, Support, SurfaceError, SurfaceName};
@@ -97,7 +97,7 @@ impl Scene {
     /// The TOML of a built-in scene or a file, and how messages call it.
     ///
     /// # Errors
-    /// An unknown name or an unreadable file.
+    /// An unknown name, an unreadable file, or one that is no text.
     pub fn find(name_or_path: &str) -> Result<(String, String), SceneError> {
         if let Some(text) = library::text(name_or_path) {
             return Ok((text.to_owned(), format!("built-in scene {name_or_path}")));
@@ -108,9 +108,8 @@ impl Scene {
             let known = library::names().collect::<Vec<_>>().join(", ");
             return Err(SceneError::UnknownScene { name: name_or_path.to_owned(), known });
         }
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| SceneError::Read { path: name_or_path.to_owned(), source })?;
-        Ok((text, name_or_path.to_owned()))
+        let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: name_or_path.to_owned(), source })?;
+        Ok((read::text(bytes, name_or_path)?, name_or_path.to_owned()))
     }
 
     /// As [`Scene::load`] for TOML that is already in memory; `origin` names it in messages, and mesh files are sought
@@ -161,7 +160,8 @@ impl Scene {
     pub fn steps(&self) -> &[Step] {
         match self.step.is_empty() {
             false => &self.step,
-            true if self.has_limit_load() => &step::AT_MOST,
+            // Overlaps and prescribed displacements are there from the beginning: half of the loads is less only where there are loads.
+            true if self.has_limit_load() && !self.load.is_empty() => &step::AT_MOST,
             true => &step::AT_ONCE,
         }
     }

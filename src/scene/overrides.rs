@@ -78,13 +78,22 @@ fn refused(set: &str, problem: String) -> SceneError {
     SceneError::Override { set: set.to_owned(), problem }
 }
 
+/// Whether this is an override at all, whatever the scene.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn well_formed(set: &str) -> Result<(), String> {
+    split(set).map(drop)
+}
+
 fn parse(set: &str) -> Result<Override, SceneError> {
-    let (path, value) = set
-        .split_once('=')
-        .ok_or_else(|| refused(set, "write dotted.path=value, as in solver.qp=active-set".into()))?;
-    let path = parse_path(path).ok_or_else(|| refused(set, format!("`{path}` is not a dotted path")))?;
-    let value = parse_value(value.trim()).map_err(|problem| refused(set, problem))?;
-    Ok(Override { path, value })
+    split(set).map_err(|problem| refused(set, problem))
+}
+
+fn split(set: &str) -> Result<Override, String> {
+    let (path, value) = set.split_once('=').ok_or("write dotted.path=value, as in solver.qp=active-set")?;
+    let path = parse_path(path).ok_or_else(|| format!("`{path}` is not a dotted path"))?;
+    Ok(Override { path, value: parse_value(value.trim())? })
 }
 
 fn parse_path(path: &str) -> Option<Vec<String>> {

@@ -33,6 +33,22 @@ fn too_long(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
     SceneError::Syntax { place: place(text, origin, &[], key), message }
 }
 
+/// The text of a file.
+pub(super) fn text(bytes: Vec<u8>, origin: &str) -> Result<String, SceneError> {
+    let no_text = |before: &[u8]| {
+        let before = String::from_utf8_lossy(before);
+        let position = Some(line_column(&before, before.len()..before.len()));
+        let message = "this is no text in UTF-8, as scenes are".to_owned();
+        SceneError::Syntax { place: Place::Text { origin: origin.to_owned(), position }, message }
+    };
+    // Where texts go from rank to rank they end at a NUL, which TOML has not either.
+    match (bytes.iter().position(|byte| *byte == 0), String::from_utf8(bytes)) {
+        (None, Ok(text)) => Ok(text),
+        (_, Err(error)) => Err(no_text(&error.as_bytes()[..error.utf8_error().valid_up_to()])),
+        (Some(at), Ok(text)) => Err(no_text(&text.as_bytes()[..at])),
+    }
+}
+
 /// A message of the TOML reader on one line, without the vocabulary of Rust types.
 pub(super) fn in_user_words(message: &str) -> String {
     let words = [

@@ -143,13 +143,14 @@ pub(super) fn summarise(
     rows: Vec<StepRow>,
     comm: &dyn Comm,
 ) -> Summary {
-    let Followed { solution, steps, failure } = followed;
+    let Followed { steps, failure, .. } = followed;
     let sizes = sizes(discrete, comm);
-    let state = rows.last().map(|row| row.state.clone()).unwrap_or_default();
+    let last = rows.last().map(|row| row.state.clone()).unwrap_or_default();
+    let state = State { plastic_elements: rows.iter().filter_map(|row| row.state.plastic_elements).max(), ..last };
     let total = |count: fn(&StepRecord) -> usize| Some(steps.iter().map(|(_, s)| count(s)).sum::<usize>() as u64);
     let message = |(at, outcome): &(At, newton::Outcome)| {
         let mut message = outcome.message()?;
-        if scene.has_limit_load() {
+        if scene.has_limit_load() && !scene.load.is_empty() {
             message = collapse(scene, &rows, *at, &message);
         }
         let place = place(scene, *at).filter(|_| !scene.step.is_empty());
@@ -159,7 +160,7 @@ pub(super) fn summarise(
         title: scene.title.clone(),
         contacts: discrete.contact_rows.clone(),
         converged: Some(failure.is_none()),
-        plastic_fraction: Some(solution.plastic_elements as f64 / sizes.elements as f64),
+        plastic_fraction: state.plastic_elements.map(|plastic| plastic as f64 / sizes.elements as f64),
         newton_iterations: Some(steps.len() as u64),
         qp: qp_name(scene, discrete.constraints.has_inequalities).to_owned(),
         counters: Counters {
@@ -244,8 +245,8 @@ fn collapse(scene: &Scene, rows: &[StepRow], at: At, reason: &str) -> String {
     let failed = at.time();
     let Some(reached) = rows.iter().filter(|row| row.converged).map(|row| row.time).next_back() else {
         return format!(
-            "no equilibrium was found, not even at {begin}{failed:.4}{unit}: bodies without hardening bear less than their limit \
-             load, and this is probably more ({reason})"
+            "no equilibrium was found, not even at {begin}{failed:.4}{unit}: that is probably more than the limit load of bodies \
+             without hardening, or what supports and overlaps prescribe beside it is too much ({reason})"
         );
     };
     format!(

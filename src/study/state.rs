@@ -5,6 +5,7 @@
 //! subdomains matter, and bodies may be others, if only those that take their state have the same mesh. The displacement
 //! comes with it, from the last fields: equilibrium with that state does not depend on it, but is near.
 
+use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::path::Path;
 
@@ -93,8 +94,11 @@ pub struct Earlier {
 pub fn earlier(comm: &dyn Comm, scene: &Scene, discrete: &Discrete, initial: &Initial) -> Result<Earlier, NoStart> {
     let path = scene.directory.join(&initial.result);
     let shown = || path.display().to_string();
-    on_root(comm, "opening", || std::fs::File::open(&path).and_then(|file| file.metadata()).map(drop))
-        .map_err(|reason| NoStart::Missing { path: shown(), reason })?;
+    let open = || match std::fs::File::open(&path)?.metadata()?.is_dir() {
+        true => Err(ErrorKind::IsADirectory.into()),
+        false => Ok::<_, io::Error>(()),
+    };
+    on_root(comm, "opening", open).map_err(|reason| NoStart::Missing { path: shown(), reason })?;
     read(comm, scene, discrete, initial, &path).map_err(|reason| NoStart::Unfit { path: shown(), reason })
 }
 

@@ -77,7 +77,6 @@ fn what_would_be_ignored_is_refused() {
 #[test]
 fn surfaces_that_do_not_exist_are_named() {
     assert_override_refused("support.top.surface=upper.top", &["upper.top", "zmax"]);
-    assert_override_refused("contact.joint.slave=", &["contact.joint.slave="]);
 }
 
 #[test]
@@ -174,6 +173,58 @@ fn a_wrong_command_line_is_a_usage_error() {
         assert_refused(&run_misused(ranks, &["slove"]), USAGE, &["slove"]);
         assert_refused(&run_misused(ranks, &["solve", "patch", "--level", "two"]), USAGE, &["--level", "two"]);
         assert_refused(&run_misused(ranks, &["show", "nothing"]), USAGE, &["nothing", "two-blocks"]);
+    }
+}
+
+#[test]
+fn a_malformed_value_of_any_option_is_a_usage_error() {
+    let set = ["novalue", "=3", "a b=1", "solver.qp_limit=[", "contact.joint.slave=", "title=\"open"];
+    let time = ["", "0", "-1", "soon", "1:2:3:4"];
+    let options: [(&str, &[&str], &str); 10] = [
+        ("--set", &set, "value"),
+        ("--level", &["0", "-1", "1.5", "two", "99999999999999999999"], "start at 1"),
+        ("--qp", &["foo", "", "mprgp"], "active-set"),
+        ("--preconditioner", &["foo", ""], "dirichlet"),
+        ("--accuracy", &["-1", "0", "1", "nan", "inf", "tenth"], "above 0 and below 1"),
+        ("--cascade", &["maybe"], "auto, on, off"),
+        ("--progress", &["often"], "auto, plain or off"),
+        ("--time-limit", &time, "30m"),
+        ("--checkpoint-every", &time, "30m"),
+        ("--summary", &[""], "--summary"),
+    ];
+    for (option, values, told) in options {
+        for value in values {
+            let refused = run_misused(1, &["solve", "patch", &format!("{option}={value}")]);
+            assert_refused(&refused, USAGE, &[option]);
+            assert!(value.is_empty() || refused.stderr.contains(told) || option == "--set", "{}", refused.stderr);
+        }
+    }
+    assert_refused(&run_misused(1, &["solve", "patch", "--accuracy", "-1"]), USAGE, &["--accuracy", "above 0"]);
+    assert_refused(&run_misused(1, &["check", "patch", "--level", "-1"]), USAGE, &["--level", "start at 1"]);
+    assert_refused(&run_misused(1, &["resume", "none.h5", "--set", "decomposition"]), USAGE, &["decomposition"]);
+    assert_refused(&run_misused(1, &["verify", "--element", "hex20"]), USAGE, &["hex20", "tet4, hex8 or tet10"]);
+    // What is well formed, but fits no scene, is a bad scene.
+    assert_override_refused("solver.qp=foo", &["solver.qp=foo", "active-set"]);
+}
+
+#[test]
+fn what_is_no_text_is_a_bad_scene_and_what_cannot_be_read_is_not() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("scene.toml");
+    let path = file.to_str().unwrap();
+    for bytes in [&b"title = 'a'\nunits = 'mm\xb2'"[..], b"title = 'a'\nunits = 'mm\0'"] {
+        fs::write(&file, bytes).unwrap();
+        assert_scene_refused(path, &[], BAD_SCENE, &["scene.toml, line 2, column 12", "UTF-8"]);
+    }
+    fs::remove_file(&file).unwrap();
+    assert_scene_refused(path, &[], INPUT_OUTPUT, &["scene.toml", "No such file"]);
+    fs::create_dir(&file).unwrap();
+    assert_scene_refused(path, &[], INPUT_OUTPUT, &["scene.toml", "Is a directory"]);
+    let body = "body.bar={material = 'steel', element = 'tet4', gmsh = {file = '/'}}";
+    let sets = [body, "decomposition={method = 'metis'}"];
+    assert_scene_refused("bar", &sets, INPUT_OUTPUT, &["mesh file", "Is a directory"]);
+    for (result, reason) in [("/none.vtkhdf", "No such file"), ("/", "is a directory")] {
+        assert_scene_refused("bar", &[&format!("initial.result='{result}'")], INPUT_OUTPUT, &[result, reason]);
     }
 }
 

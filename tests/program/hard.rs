@@ -2,7 +2,8 @@
 //! contact, bodies that only contact holds, decompositions into shreds or into whole bodies.
 
 use crate::common::{
-    COARSE, COARSEST, Run, assert_close, assert_near, assert_residuals, number, scene_file, solve, solve_with, vector,
+    COARSE, COARSEST, Run, assert_close, assert_near, assert_residuals, assert_scene_refused, number, scene_file,
+    solve, solve_with, vector,
 };
 use serde_json::Value;
 
@@ -141,6 +142,45 @@ fn a_million_times_stiffer_body_converges_with_scaling() {
         let summary = coarse(&[stiff, "load.top.traction.2=-30", "solver.preconditioner=lumped"]);
         assert_balance(&summary, 9e7);
     }
+}
+
+/// Two columns, the upper one standing on the lower one by contact alone, under uniaxial stress: the sum of what both give way.
+#[test]
+fn bodies_of_any_ratio_of_stiffness_stand_on_each_other_as_in_the_closed_form() {
+    let directory = tempfile::tempdir().unwrap();
+    for element in ["tet4", "hex8"] {
+        for exponent in [-15, -12, -10, -9, -6, -3, 3, 6, 9, 10, 12, 15] {
+            let ratio = 10.0_f64.powi(exponent);
+            let text = columns(element, 1e3, 1e3 * ratio);
+            let summary = solve(1, &scene_file(directory.path(), &text), &[]).converged().summary();
+            assert_residuals(&summary, 1e-6);
+            assert_near("contact force", vector(&summary["contact_force"]), [0.0, 0.0, 1.0], 1e-6);
+            assert_close("displacement", number(&summary, "max_displacement"), 1e-3 * (1.0 + 1.0 / ratio), 1e-5);
+        }
+    }
+    // What slides is refused with that reason, whatever the ratio.
+    for stiff in [1e3, 1e15, 1e18] {
+        let slides = columns("hex8", 1e3, stiff).replace("fix = [\"x\"]", "fix = [\"y\"]");
+        let parts = ["body.upper: nothing determines its translation along +x"];
+        assert_scene_refused(&scene_file(directory.path(), &slides), &[], 65, &parts);
+    }
+}
+
+fn columns(element: &str, lower: f64, upper: f64) -> String {
+    format!(
+        r#"
+        material.lower = {{ young = {lower:e}, poisson = 0.0 }}
+        material.upper = {{ young = {upper:e}, poisson = 0.0 }}
+        body.lower = {{ material = "lower", element = "{element}", brick = {{ origin = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0], cells = [2, 2, 4] }} }}
+        body.upper = {{ material = "upper", element = "{element}", brick = {{ origin = [0.0, 0.0, 1.0], size = [1.0, 1.0, 1.0], cells = [2, 2, 4] }} }}
+        support.base = {{ surface = "lower.zmin", fix = ["x", "y", "z"] }}
+        support.along-x = {{ surface = "upper.xmin", fix = ["x"] }}
+        support.along-y = {{ surface = "upper.ymin", fix = ["y"] }}
+        load.press = {{ surface = "upper.zmax", traction = [0.0, 0.0, -1.0] }}
+        contact.joint = {{ slave = "upper.zmin", master = "lower.zmax" }}
+        decomposition.cells = [2, 2, 2]
+        "#
+    )
 }
 
 /// As strong as before, and a million times stiffer than strong: it begins to flow everywhere at once. Where steps go depends on

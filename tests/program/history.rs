@@ -2,7 +2,9 @@
 //! bodies in contact, increments that are cut back, and the series of results.
 
 use crate::common::fields::Fields;
-use crate::common::{COARSE, assert_close, assert_residuals, number, solve, solve_tightly, vector};
+use crate::common::{
+    COARSE, COARSEST, assert_close, assert_residuals, number, scene_file, solve, solve_tightly, vector,
+};
 use fetiplast::analytic::cycle::Cycle;
 use fetiplast::material::Material;
 use serde_json::Value;
@@ -241,4 +243,41 @@ fn the_log_names_the_steps() {
     }
     let plain = solve(RANKS, "bar", &[]).converged();
     assert!(!plain.stdout.contains("load step"), "{}", plain.stdout);
+}
+
+#[test]
+fn the_summary_of_a_history_tells_of_its_flow_though_it_ends_by_unloading() {
+    let summary = solve(RANKS, "two-blocks", &[&COARSEST[..], &["step=[{}, {amplitude=0.5}]"]].concat());
+    let summary = summary.converged().summary();
+    let rows = summary["steps"].as_array().unwrap();
+    let flowing: Vec<f64> = rows.iter().map(|row| number(row, "plastic_elements")).collect();
+    assert!(flowing[0] > 0.0 && flowing[1] == 0.0, "{flowing:?}");
+    assert_eq!(number(&summary, "plastic_elements"), flowing[0]);
+    assert_eq!(number(&summary, "plastic_fraction"), flowing[0] / number(&summary, "elements"));
+    assert_eq!(summary["contact_force"], rows[1]["contact_force"]);
+}
+
+/// Cylinders that are pressed into each other by far more than they bear: what is told is not of loads, which there are not.
+#[test]
+fn a_press_fit_that_fails_is_not_told_of_loads() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut text = String::from("material.soft = { young = 1000.0, poisson = 0.3, yield_stress = 1e-3 }\n");
+    for (body, inner) in [("inner", 1.0), ("outer", 2.0)] {
+        let shape = format!("{{ inner = {inner:?}, outer = {:?}, height = 0.5, cells = [8, 4, 2] }}", inner + 1.0);
+        text += &format!("body.{body} = {{ material = 'soft', element = 'tet4', cylinder = {shape} }}\n");
+        for (surface, axis) in [("x0", "x"), ("y0", "y"), ("bottom", "z"), ("top", "z")] {
+            text += &format!("support.{body}-{surface} = {{ surface = '{body}.{surface}', fix = ['{axis}'] }}\n");
+        }
+    }
+    text += "contact.fit = { surfaces = ['inner.outer', 'outer.inner'], gap = -0.2 }\nsolver.newton_limit = 5\n";
+    let run = solve(RANKS, &scene_file(directory.path(), &text), &[]);
+    assert_eq!(run.code, 1, "{}{}", run.stdout, run.stderr);
+    let summary = run.summary();
+    assert!(!run.stdout.contains("load") && !run.stdout.contains("halved"), "{}", run.stdout);
+    assert!(summary["error"].as_str().unwrap().contains("solver.newton_limit"), "{}", summary["error"]);
+    assert_eq!(number(&summary, "newton_iterations"), 5.0);
+    // The state is that of the only attempt.
+    let rows = summary["steps"].as_array().unwrap();
+    assert!(rows.len() == 1 && rows[0]["converged"] == false);
+    assert!(number(&summary, "max_displacement") > 0.1 && number(&summary, "plastic_fraction") > 0.3);
 }

@@ -10,6 +10,7 @@ mod common;
 mod edges;
 mod elements;
 mod faults;
+mod files;
 mod fuzz;
 mod gmsh;
 mod hard;

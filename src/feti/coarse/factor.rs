@@ -83,27 +83,32 @@ pub struct CoarseFactor {
     symbolic: Rc<Symbolic>,
     factor: Factor,
     workspace: RefCell<Workspace>,
+    /// Of the entries of the matrix.
+    largest: f64,
 }
 
 impl CoarseFactor {
     /// Of these blocks, for which `symbolic` has to have places.
     ///
     /// # Errors
-    /// If they are singular, the cluster where that shows.
+    /// If they are not positive definite, the cluster where that shows.
     pub fn new(symbolic: &Rc<Symbolic>, blocks: &Blocks) -> Result<Self, usize> {
         let Symbolic { begins, rows, cholesky, .. } = &**symbolic;
         let (lower, values) = (Lower { column_begin: begins, rows }, symbolic.values(blocks));
         let mut workspace = Workspace::new([cholesky]);
         let mut factor = Factor::new(cholesky, Precision::Double);
         workspace.factorise(cholesky, lower, &values, &mut factor).map_err(|breakdown| breakdown.unknown / MODES)?;
-        let result = Self { symbolic: Rc::clone(symbolic), factor, workspace: RefCell::new(workspace) };
-        // Round-off can hide a free motion: the factor then answers far beyond the size of the matrix.
         let largest = values.iter().copied().fold(0.0, f64::max);
-        result.check_rank(begins.len() - 1, largest).map(|()| result)
+        Ok(Self { symbolic: Rc::clone(symbolic), factor, workspace: RefCell::new(workspace), largest })
     }
 
-    /// Inverse iteration from a fixed vector without a pattern: a free motion shows as a huge response.
-    fn check_rank(&self, n: usize, largest: f64) -> Result<(), usize> {
+    /// Round-off can hide a free motion: the factor then answers far beyond the size of the matrix. Inverse iteration from a
+    /// fixed vector without a pattern.
+    ///
+    /// # Errors
+    /// The cluster that answers most.
+    pub fn check_rank(&self) -> Result<(), usize> {
+        let (n, largest) = (self.symbolic.begins.len() - 1, self.largest);
         let sound = |response: f64| response.abs() * largest < (n as f64).sqrt() / SINGULAR;
         // Multiples of an irrational number: no motion of a few clusters is orthogonal to them.
         let mut x: Vec<f64> = (1..=n).map(|k| (k as f64 * std::f64::consts::SQRT_2).fract() - 0.5).collect();

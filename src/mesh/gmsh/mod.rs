@@ -17,7 +17,7 @@ pub mod volume;
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 pub use error::Problem;
@@ -82,8 +82,15 @@ impl Msh {
     /// # Errors
     /// If it cannot be read, or is no sound mesh.
     pub fn read(path: &Path) -> Result<Self, Problem> {
-        let file = File::open(path)?;
-        let length = file.metadata()?.len();
+        let mut file = File::open(path)?;
+        let about = file.metadata()?;
+        if !about.is_file() {
+            // Nobody knows how long a pipe is.
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes)?;
+            return Self::parse(&bytes[..], bytes.len() as u64);
+        }
+        let length = about.len();
         Self::parse(BufReader::with_capacity(1 << 16, file), length)
     }
 
