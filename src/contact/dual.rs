@@ -33,7 +33,8 @@ pub fn functions(mass: &[[f64; 3]; 3], active: [bool; 3]) -> Option<DualFunction
     });
     let inverse = invert(&n);
     let scaled: [[f64; 3]; 3] = std::array::from_fn(|j| std::array::from_fn(|k| areas[j] * inverse[j][k]));
-    if (0..3).any(|j| active[j] && (0..3).any(|k| active[k] && !(scaled[j][k].abs() <= STEEP))) {
+    let tame = (0..3).all(|j| !active[j] || (0..3).all(|k| !active[k] || scaled[j][k].abs() <= STEEP));
+    if !tame {
         return None;
     }
     let masked = std::array::from_fn(|j| if active[j] { scaled[j] } else { [0.0; 3] });
