@@ -33,7 +33,8 @@ fn pressures_do_not_depend_on_where_the_scene_is() {
             let file = scene_file(directory.path(), &cubes(origin, element));
             let run = solve_tightly(1, &file, &[]);
             let fields = Fields::read(&run.result());
-            let (pressure, status) = (fields.of_points("contact_pressure"), fields.integers_of_points("contact_status"));
+            let (pressure, status) =
+                (fields.of_points("contact_pressure"), fields.integers_of_points("contact_status"));
             for (pressure, _) in pressure.iter().zip(status).filter(|(_, status)| *status >= 0) {
                 assert!((pressure / 1e-3 - 1.0).abs() < 1e-5, "{element} at {origin}: {pressure}");
             }
