@@ -288,6 +288,7 @@ fn rounding(scene: &Scene, discrete: &Discrete, of_bodies: &[Worst]) -> Option<E
 /// What to tell of measures beyond their limits, of the increments that converged: the worst of each.
 pub(super) fn warnings(scene: &Scene, rows: &[StepRow]) -> Vec<String> {
     type Of = fn(&Measures) -> &Option<Extreme>;
+    const NOTHING: &str = "results there mean nothing; loads are too large";
     let to_begin_nearer = "start with the bodies nearer to where they end";
     let tell = |of: Of, limit: f64, what: &str, consequence: &dyn Fn(f64) -> String| {
         let reached = rows.iter().filter(|row| row.converged);
@@ -304,11 +305,13 @@ pub(super) fn warnings(scene: &Scene, rows: &[StepRow]) -> Vec<String> {
         (*value > limit).then(text)
     };
     let told = [
-        tell(|m| &m.max_strain, STRAIN, "the strain of body", &|strain| {
-            format!("stresses there are off by about {} of themselves; loads are too large", short(0.5 * strain))
+        tell(|m| &m.max_strain, STRAIN, "the strain of body", &|strain| match strain {
+            1.0.. => NOTHING.to_owned(),
+            _ => format!("stresses there are off by about {} of themselves; loads are too large", short(0.5 * strain)),
         }),
-        tell(|m| &m.max_rotation, ROTATION, "the rotation (radians) of body", &|angle| {
-            format!("what is left out is a strain of about {} there; loads are too large", short(0.5 * angle * angle))
+        tell(|m| &m.max_rotation, ROTATION, "the rotation (radians) of body", &|angle| match angle {
+            1.0.. => NOTHING.to_owned(),
+            _ => format!("a strain of about {} is missing there; loads are too large", short(0.5 * angle * angle)),
         }),
         tell(|m| &m.max_relative_displacement, DISPLACEMENT, "the displacement, in its sizes, of body", &|_| {
             format!("loads and contacts stay where they were; {to_begin_nearer}")
