@@ -12,6 +12,7 @@ pub mod dual;
 pub mod edge;
 pub mod matching;
 pub mod mortar;
+pub mod opposite;
 pub mod pairing;
 pub mod quadratic;
 pub mod rigid;
