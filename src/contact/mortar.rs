@@ -11,7 +11,7 @@
 //! node as it should: flat surfaces pass the patch test whatever their meshes. Normals stay those of the start.
 //!
 //! All integrals are over what has the master opposite. On faces that it covers in part, multipliers move to its edge
-//! ([`super::edge`]): none pushes beyond it. Nodes of which less than [`REACH`] of the way is covered carry no condition, nor do
+//! ([`super::edge`]): none pushes beyond it. Nodes of which less than `REACH` of the way is covered carry no condition, nor do
 //! those whose normal direction supports hold, so rows stay independent; the pressure on their part of a face goes to its other
 //! corners.
 //!

@@ -47,7 +47,7 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
     }
 }
 
-/// Memory that solving would take: as the model of [`super::memory`] has it, from the analysis of all subdomains.
+/// Memory that solving would take: as the model of [`mod@super::memory`] has it, from the analysis of all subdomains.
 /// Subdomains of equal connectivity are analysed once. Collective.
 pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
     let Discrete { decomposition, constraints, pairs, .. } = discrete;
