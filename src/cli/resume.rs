@@ -42,7 +42,7 @@ pub struct Resume {
 }
 
 /// What a checkpoint is written by; others are not understood.
-const FORMAT: &str = "fetiplast checkpoint 3";
+const FORMAT: &str = "fetiplast checkpoint 4";
 
 /// What a checkpoint says of its run.
 pub(super) fn labels(plan: &Plan, scene: &str) -> [(&'static str, String); 4] {

@@ -143,9 +143,11 @@ pub(super) fn carry_out(
     let Setting { mut timer, out, conduct, signals } = setting;
     let Conduct { progress, ignore_memory, checkpoints, trace, log_json } = conduct;
     let mut monitor = Monitor::of_rank(comm.rank(), progress);
-    if let Some(counted) = Counted::new(scene) {
-        make_room(comm, &counted, ignore_memory, &mut monitor)?;
-    }
+    let tight = match Counted::new(scene) {
+        Some(counted) => make_room(comm, &counted, ignore_memory)?,
+        None => None,
+    };
+    tight.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
     if trace.is_some() {
         timer.keep_spans();
     }
@@ -213,7 +215,7 @@ pub(super) fn carry_out(
     describe_run(summary, &plan.source, comm);
     let of_solution = std::mem::take(&mut summary.warnings);
     let before = warnings(scene, &discrete.warnings, summary.sizes.subdomains, comm);
-    summary.warnings = [before, of_solution.clone()].concat();
+    summary.warnings = tight.into_iter().chain(before).chain(of_solution.iter().cloned()).collect();
     summary.mesh_reading_mb = discrete.reading_mb;
     summary.provenance = solved.records.provenance.into_iter().filter(|(name, _)| name != "scene").collect();
     summary.cascade = plan.rows;
@@ -252,14 +254,13 @@ struct Run<'a> {
     ignore_memory: bool,
 }
 
-/// Refuses a run that cannot fit, unless told to begin. Collective.
-fn make_room(comm: &dyn Comm, counted: &Counted, ignore: bool, monitor: &mut Monitor) -> Result<(), Failure> {
-    let Some(room) = Room::find(comm, &counted.memory()) else { return Ok(()) };
+/// Refuses a run that cannot fit, unless told to begin; what to tell where it hardly does. Collective.
+fn make_room(comm: &dyn Comm, counted: &Counted, ignore: bool) -> Result<Option<String>, Failure> {
+    let Some(room) = Room::find(comm, &counted.memory()) else { return Ok(None) };
     if !ignore {
         room.refuse()?;
     }
-    room.warning().into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
-    Ok(())
+    Ok(room.warning())
 }
 
 impl Run<'_> {
@@ -278,9 +279,9 @@ impl Run<'_> {
             plan.yielding = timer.time("interpolation", || study::expected_yielding(comm, (coarse, solved), scene));
         }
         let yielding = plan.yielding.as_deref();
-        let discrete = timer.time("discretisation", || study::discretise_expecting(scene, yielding, comm))?;
+        let mut discrete = timer.time("discretisation", || study::discretise_expecting(scene, yielding, comm))?;
         if let Some(counted) = Counted::of_read(scene, &discrete.bodies) {
-            make_room(comm, &counted, self.ignore_memory, monitor)?;
+            discrete.warnings.extend(make_room(comm, &counted, self.ignore_memory)?);
         }
         let sizes = study::sizes(&discrete, comm);
         let subdomains = sizes.subdomains;

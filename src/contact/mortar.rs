@@ -31,9 +31,13 @@ use crate::mesh::surface;
 /// Share of its surface that a slave node must have opposite a master.
 const COVERED: f64 = 1e-6;
 
-/// Share of the way to a slave node that must be covered for it to carry a condition: with less, it would say almost the same as
-/// those of its neighbours, and the dual problem would be nearly singular.
+/// The linear function of a slave node that must be reached within the covered part for the node to carry a condition: with less, it
+/// would say almost the same as those of its neighbours, and the dual problem would be nearly singular. One corner of every face
+/// reaches a third.
 const REACH: f64 = 0.25;
+
+/// The same share from which a node counts as covered in results: coordinates of parts that meet differ by rounding.
+const AT_THE_EDGE: f64 = 1.0 - 1e-3;
 
 /// The covered part of a slave face.
 struct Part<'a> {
@@ -82,8 +86,10 @@ pub fn pair(
         active[node] = sums.whole > COVERED * normals[node].1;
         active[node]
     });
+    let held = (0..reach.len()).filter(|&node| reach[node] >= REACH && is_held(node)).count();
     if sums.is_empty() {
-        return Err(ContactError::AllHeld { name: name.to_owned() });
+        let name = name.to_owned();
+        return Err(if held > 0 { ContactError::AllHeld { name } } else { ContactError::Apart { name } });
     }
     let of_node: BTreeMap<usize, usize> = sums.keys().copied().zip(0..).collect();
     let condition = |(node, sums): (usize, Sums)| {
@@ -101,13 +107,13 @@ pub fn pair(
             masters: masters.into_iter().map(|(l, sum)| (l, sum / whole)).collect(),
             normal,
             area,
-            covered: reach[node] >= 1.0,
+            covered: reach[node] >= AT_THE_EDGE,
         }
     };
     Ok(Conditions {
         pairs: sums.into_iter().map(condition).collect(),
         masters: master_nodes(&parts, master, &of_node),
-        held: (0..reach.len()).filter(|&node| reach[node] >= REACH && is_held(node)).count(),
+        held,
     })
 }
 
@@ -144,22 +150,21 @@ fn reach(parts: &[Part], nodes: usize) -> Vec<f64> {
     reach
 }
 
-/// What the pressure is at the master's nodes, from the conditions on the slave's: where several faces are opposite, the nearest
-/// counts.
+/// What the pressure is at the master's nodes, on each smooth part around them, from the conditions on the slave's: where several
+/// faces are opposite, the nearest counts.
 fn master_nodes(parts: &[Part], master: &GatheredSurface, of_node: &BTreeMap<usize, usize>) -> Vec<MasterNode> {
-    let mut nearest: BTreeMap<u64, (f64, Vec<(usize, f64)>)> = BTreeMap::new();
+    let mut nearest: BTreeMap<usize, (f64, Vec<(usize, f64)>)> = BTreeMap::new();
     for Part { face, seen, .. } in parts {
         for &(node, distance, at) in &seen.masters {
             let weights = (0..3).filter_map(|k| Some((*of_node.get(&face[k])?, at[k].max(0.0))));
             let weights: Vec<_> = weights.filter(|(_, weight)| *weight > INSIDE).collect();
             let whole: f64 = weights.iter().map(|(_, weight)| weight).sum();
-            let number = master.nodes[node];
-            if whole > 0.0 && nearest.get(&number).is_none_or(|(known, _)| distance.abs() < known.abs()) {
-                nearest.insert(number, (distance, weights.into_iter().map(|(k, w)| (k, w / whole)).collect()));
+            if whole > 0.0 && nearest.get(&node).is_none_or(|(known, _)| distance.abs() < known.abs()) {
+                nearest.insert(node, (distance, weights.into_iter().map(|(k, w)| (k, w / whole)).collect()));
             }
         }
     }
-    nearest.into_iter().map(|(node, (_, pairs))| MasterNode { node, pairs }).collect()
+    nearest.into_iter().map(|(node, (_, pairs))| MasterNode { node: master.nodes[node], pairs }).collect()
 }
 
 /// Whether supports fix all of a direction, but for round-off.

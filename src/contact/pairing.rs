@@ -36,7 +36,10 @@ pub fn pair(
         (Some(found), [false, false]) => Ok((found, Rule::NodeToNode)),
         (Some(found), [true, true]) => {
             let gap = |pair: &ContactPair, along| quadratic::distance(slave, master, pair, along);
-            Ok((Conditions { pairs: quadratic::conditions(slave, found.pairs, gap), ..found }, Rule::NodeToNode))
+            let count = found.pairs.len();
+            let pairs = quadratic::conditions(slave, found.pairs, gap);
+            assert_eq!(pairs.len(), count, "covered faces have all their corners");
+            Ok((Conditions { pairs, ..found }, Rule::NodeToNode))
         }
         _ => Ok((mortar::pair(contact, name, slave, master, &held(&slave.nodes))?, Rule::Mortar)),
     }

@@ -10,7 +10,7 @@
 //! obstacle: a node there has one condition, on the area of both.
 
 use super::surface::{GatheredSurface, difference, dot, unit};
-use super::{ContactError, ContactPair};
+use super::{ContactError, ContactPair, quadratic};
 use crate::scene::Obstacle;
 
 /// Cosine between the direction to the obstacle and the outward normal from which a surface faces the obstacle.
@@ -33,20 +33,21 @@ pub fn pair(
     obstacle: &Obstacle,
 ) -> Result<Vec<ContactPair>, ContactError> {
     let nodes = surface.nodes.iter().zip(&surface.points).zip(surface.normals_and_areas());
-    let mut pairs: Vec<ContactPair> = Vec::new();
-    for (((&slave, &point), (outward, area)), &part) in nodes.zip(&surface.parts) {
-        let Some((normal, gap)) = approach(obstacle, point, outward) else { continue };
-        if dot(normal, outward) <= FACING {
-            continue;
-        }
-        match pairs.last_mut().filter(|last| last.slave == slave && last.normal == normal) {
-            Some(last) => last.area += area,
-            None => {
-                let (slaves, masters) = (vec![(slave, 1.0)], Vec::new());
-                pairs.push(ContactPair { contact, slave, part, slaves, masters, normal, gap, area, covered: true });
-            }
-        }
-    }
+    let facing = |(((&slave, &point), (outward, area)), &part): (((&u64, &[f64; 3]), ([f64; 3], f64)), &u32)| {
+        let (normal, gap) = approach(obstacle, point, outward)?;
+        let (slaves, masters) = (vec![(slave, 1.0)], Vec::new());
+        let pair = ContactPair { contact, slave, part, slaves, masters, normal, gap, area, covered: true };
+        (dot(normal, outward) > FACING).then_some(pair)
+    };
+    let pairs = nodes.zip(&surface.parts).filter_map(facing).collect();
+    let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);
+    let mut pairs = quadratic::conditions(surface, pairs, along);
+    // What is left of several parts of a node is one condition if it says the same.
+    pairs.dedup_by(|next, first| {
+        let same = (next.slave, next.normal, &next.slaves) == (first.slave, first.normal, &first.slaves);
+        first.area += if same { next.area } else { 0.0 };
+        same
+    });
     if pairs.is_empty() {
         return Err(ContactError::LooksAway { name: name.to_owned(), slaves: surface.nodes.chunk_by(u64::eq).count() });
     }
@@ -201,5 +202,30 @@ mod tests {
         let floor = Obstacle::Plane { point: [0.0; 3], normal: UP };
         let error = pair(2, "floor", &roof, &floor).unwrap_err();
         assert_eq!(error, ContactError::LooksAway { name: "floor".into(), slaves: 4 });
+    }
+
+    /// Two quadratic faces that meet at a ridge: all nodes of both have conditions, those of the ridge one each.
+    #[test]
+    fn quadratic_faces_on_both_sides_of_an_edge_are_paired() {
+        let points = [
+            [-1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.0, 1.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [-0.5, 0.0, 0.5],
+            [0.0, 0.5, 1.0],
+            [-0.5, 0.5, 0.5],
+            [0.5, 0.5, 0.5],
+            [0.5, 0.0, 0.5],
+        ];
+        let faces = [vec![0, 1, 2, 4, 5, 6], vec![3, 2, 1, 7, 5, 8]];
+        let roof = GatheredSurface::new(&faces, &(0..).zip(points).collect());
+        assert_eq!(roof.nodes.len(), 12, "three nodes of the ridge have two parts");
+        let lid = Obstacle::Plane { point: [0.0, 0.0, 3.0], normal: [0.0, 0.0, -1.0] };
+        let pairs = pair(0, "lid", &roof, &lid).expect("both slopes face it");
+        assert_eq!(pairs.iter().map(|p| p.slave).collect::<Vec<_>>(), (0..9).collect::<Vec<_>>());
+        let area: f64 = pairs.iter().map(|p| p.area).sum();
+        assert!((area - 2.0_f64.sqrt()).abs() < 1e-14, "{area}");
+        assert!(pairs.iter().all(|p| (p.gap - (3.0 - points[p.slave as usize][2])).abs() < 1e-14), "{pairs:?}");
     }
 }

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 use super::ContactPair;
 use super::surface::{GatheredSurface, difference, dot};
-use crate::mesh::surface::{area, area_vector, normal};
+use crate::mesh::surface::{area, normal, quadratic_normal};
 
 /// Kinks (radians) that are round-off, and that are edges of the body.
 const KINKS: [f64; 2] = [1e-3, 0.8];
@@ -61,7 +61,8 @@ pub fn unresolved(slave: &GatheredSurface, master: &GatheredSurface, pairs: &[Co
     let (mut found, mut area) = (Unresolved { conditions: 0, sagitta: 0.0, distance: 0.0 }, 0.0);
     for pair in pairs {
         let Some(opposite) = pair.masters.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
-        let sides = [at(slave, &of_slave, pair.slave), at(master, &of_master, opposite.0)];
+        let of_slave = slave.index(pair.slave, pair.part).map_or(Bend::default(), |index| of_slave[index]);
+        let sides = [of_slave, at(master, &of_master, opposite.0)];
         let [one, other] = sides.map(|side| side.curvature);
         let sagitta = sides[0].sagitta.max(sides[1].sagitta);
         let is_alike = one * other < 0.0 && (one + other).abs() < ALIKE * one.abs().max(other.abs());
@@ -119,9 +120,8 @@ fn bends(surface: &GatheredSurface) -> Vec<Bend> {
 }
 
 /// Normal of a quadratic face in the middle of its first edge.
-fn middle_normal([a, b, c, ab, bc, ca]: [[f64; 3]; 6]) -> Option<[f64; 3]> {
-    let across = std::array::from_fn(|k| -a[k] - c[k] + 2.0 * (bc[k] + ca[k] - ab[k]));
-    let vector = area_vector(&[[0.0; 3], difference(b, a), across]);
+fn middle_normal(face: [[f64; 3]; 6]) -> Option<[f64; 3]> {
+    let vector = quadratic_normal(&face, [0.5, 0.5, 0.0]);
     let size = dot(vector, vector).sqrt();
     (size > 0.0).then(|| vector.map(|x| x / size))
 }

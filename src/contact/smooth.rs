@@ -2,14 +2,17 @@
 //!
 //! A surface that runs round an edge has no normal there: a mean of both sides points out of neither, and a pressure along it
 //! is no pressure on either. So a node has a normal, and a condition of contact, for each smooth part of the surface around
-//! it. Faces around a node belong to one part if their normals differ by at most [`SHARPEST`], or if a chain of such faces
+//! it. Faces around a node belong to one part if their normals there differ by at most [`SHARPEST`], or if a chain of such faces
 //! leads from one to the other. Curved surfaces in facets stay whole, edges of parts and chamfers of 45 degrees do not.
 
 use super::surface::dot;
-use crate::mesh::surface::area_vector;
+use crate::mesh::surface::{area_vector, quadratic_normal};
 
 /// Angle between faces from which they meet at an edge, in degrees: that of most mesh generators.
 pub const SHARPEST: f64 = 40.0;
+
+/// Slack of the cosine of that angle, so that rounding does not cut a circle of nine facets.
+const ROUNDING: f64 = 1e-9;
 
 /// A node, a face around it, and which of the face's nodes it is.
 type Slot = (u64, usize, usize);
@@ -17,10 +20,10 @@ type Slot = (u64, usize, usize);
 /// For each node of each face the number of the smooth part of the surface around that node. Faces list their corners first
 /// (three or four), then the middles of their edges; `place` is that of a node. Numbers do not depend on the order of faces.
 pub fn parts(faces: &[Vec<u64>], place: impl Fn(u64) -> [f64; 3]) -> Vec<Vec<u32>> {
-    let normals: Vec<Option<[f64; 3]>> = faces.iter().map(|face| normal(face, &place)).collect();
-    let cosine = SHARPEST.to_radians().cos();
+    let normals: Vec<Vec<Option<[f64; 3]>>> = faces.iter().map(|face| normals(face, &place)).collect();
+    let cosine = SHARPEST.to_radians().cos() - ROUNDING;
     // Faces without area are smooth with all.
-    let smooth = |a: &Slot, b: &Slot| match (normals[a.1], normals[b.1]) {
+    let smooth = |a: &Slot, b: &Slot| match (normals[a.1][a.2], normals[b.1][b.2]) {
         (Some(a), Some(b)) => dot(a, b) >= cosine,
         _ => true,
     };
@@ -43,14 +46,23 @@ pub fn parts(faces: &[Vec<u64>], place: impl Fn(u64) -> [f64; 3]) -> Vec<Vec<u32
     result
 }
 
-/// Unit normal of a face by its corners; none without area.
-fn normal(face: &[u64], place: impl Fn(u64) -> [f64; 3]) -> Option<[f64; 3]> {
-    let corners = &face[..if face.len() == 4 { 4 } else { 3 }];
-    let triangles = (2..corners.len()).map(|k| area_vector(&[corners[0], corners[k - 1], corners[k]].map(&place)));
-    let whole: [f64; 3] = triangles.fold([0.0; 3], |sum, part| std::array::from_fn(|a| sum[a] + part[a]));
-    let area = dot(whole, whole).sqrt();
-    (area > 0.0).then(|| whole.map(|x| x / area))
+/// Unit normals of a face at its nodes, which differ where it is quadratic; none without area.
+fn normals(face: &[u64], place: impl Fn(u64) -> [f64; 3]) -> Vec<Option<[f64; 3]>> {
+    let places: Vec<[f64; 3]> = face.iter().map(|&node| place(node)).collect();
+    let unit = |vector: [f64; 3]| {
+        let area = dot(vector, vector).sqrt();
+        (area > 0.0).then(|| vector.map(|x| x / area))
+    };
+    if let Ok(quadratic) = <[_; 6]>::try_from(&places[..]) {
+        return (0..6).map(|node| unit(quadratic_normal(&quadratic, NODES[node]))).collect();
+    }
+    let triangles = (2..places.len()).map(|k| area_vector(&[places[0], places[k - 1], places[k]]));
+    vec![unit(triangles.fold([0.0; 3], |sum, part| std::array::from_fn(|a| sum[a] + part[a]))); face.len()]
 }
+
+/// The nodes of a quadratic face between its corners.
+const NODES: [[f64; 3]; 6] =
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
 
 /// Cuts the faces around a node into chains of smooth neighbours.
 fn chains(slots: &[Slot], smooth: impl Fn(&Slot, &Slot) -> bool) -> Vec<Vec<Slot>> {
@@ -120,6 +132,25 @@ mod tests {
         let mut again = parts(&turned, |node| points[node as usize]);
         again.reverse();
         assert_eq!(found, again);
+    }
+
+    /// Eight quadratic faces around a circle bend by 45 degrees from corner to corner, but not at their nodes.
+    #[test]
+    fn curved_faces_are_smooth_where_their_tangents_are() {
+        let at = |eighth: f64, z: f64| {
+            let angle = eighth * std::f64::consts::FRAC_PI_4;
+            [angle.cos(), angle.sin(), z]
+        };
+        // Corners (0, 0), (1, 0), (0, 1) and (2, 0), (2, 1), (1, 0) of the unrolled strip, in eighths and z, and middles.
+        let strip = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)];
+        let next = [(1.0, 0.0), (2.0, 0.0), (1.0, 1.0), (1.5, 0.0), (1.5, 0.5), (1.0, 0.5)];
+        let points: Vec<[f64; 3]> = strip.iter().chain(&next).map(|&(s, z)| at(s, z)).collect();
+        let faces = [vec![0, 1, 2, 3, 4, 5], vec![1, 7, 8, 9, 10, 11]];
+        let curved = parts(&faces, |node| points[node as usize]);
+        assert!(curved.iter().flatten().all(|part| *part == 0), "{curved:?}");
+        // By their corners alone they are not.
+        let flat = parts(&[vec![0, 1, 2], vec![1, 7, 8]], |node| points[node as usize]);
+        assert!(flat.iter().flatten().any(|part| *part == 1), "{flat:?}");
     }
 
     #[test]

@@ -81,6 +81,12 @@ impl GatheredSurface {
         Self { nodes, parts, points, triangles, share, quadratic }
     }
 
+    /// Index of a node on one of the smooth parts around it.
+    pub fn index(&self, node: u64, part: u32) -> Option<usize> {
+        let first = self.nodes.partition_point(|known| *known < node);
+        (first..self.nodes.len()).take_while(|&k| self.nodes[k] == node).find(|&k| self.parts[k] == part)
+    }
+
     /// Corners of the triangles.
     pub fn corners(&self) -> impl Iterator<Item = [[f64; 3]; 3]> {
         self.triangles.iter().map(|triangle| triangle.map(|corner| self.points[corner]))

@@ -74,11 +74,16 @@ fn quadratic_points(face: &[[f64; 3]; 6]) -> impl Iterator<Item = ([f64; 6], [f6
     quartic().map(move |(weight, [p, q, r])| {
         let corners = [p, q, r].map(|x| x * (2.0 * x - 1.0));
         let values = [corners[0], corners[1], corners[2], 4.0 * p * q, 4.0 * q * r, 4.0 * r * p];
-        let first = [1.0 - 4.0 * p, 4.0 * q - 1.0, 0.0, 4.0 * (p - q), 4.0 * r, -4.0 * r];
-        let second = [1.0 - 4.0 * p, 0.0, 4.0 * r - 1.0, -4.0 * q, 4.0 * q, 4.0 * (p - r)];
-        let along = |d: [f64; 6]| std::array::from_fn(|i| (0..6).map(|k| d[k] * face[k][i]).sum());
-        (values, area_vector(&[[0.0; 3], along(first), along(second)]).map(|x| weight * x))
+        (values, quadratic_normal(face, [p, q, r]).map(|x| weight * x))
     })
+}
+
+/// Normal of a face with quadratic shape functions at a place between its corners, times the area of a flat one.
+pub fn quadratic_normal(face: &[[f64; 3]; 6], [p, q, r]: [f64; 3]) -> [f64; 3] {
+    let first = [1.0 - 4.0 * p, 4.0 * q - 1.0, 0.0, 4.0 * (p - q), 4.0 * r, -4.0 * r];
+    let second = [1.0 - 4.0 * p, 0.0, 4.0 * r - 1.0, -4.0 * q, 4.0 * q, 4.0 * (p - r)];
+    let along = |d: [f64; 6]| std::array::from_fn(|i| (0..6).map(|k| d[k] * face[k][i]).sum());
+    area_vector(&[[0.0; 3], along(first), along(second)])
 }
 
 /// Places in a triangle between its corners, with shares of its area: exact for polynomials of degree four (Dunavant 1985).

@@ -86,6 +86,7 @@ impl TornProblem<'_> {
             let subdomain = &self.subdomains[own];
             let sums = &mut sums[NUMBERS * subdomain.body..][..NUMBERS];
             let mut resultants = [Resultant::default(); 3];
+            let weights = self.weights(own);
             for (node, point) in subdomain.points.iter().enumerate() {
                 let arm = std::array::from_fn(|a| point[a] - centres[subdomain.body].1[a]);
                 for (resultant, forces) in resultants.iter_mut().zip([&self.loads, &supports, &contacts]) {
@@ -93,7 +94,7 @@ impl TornProblem<'_> {
                     resultant.add(force, arm);
                     sums[18] += force.iter().map(|f| f * f).sum::<f64>().sqrt();
                 }
-                sums[19] += arm.iter().map(|a| a * a).sum::<f64>();
+                sums[19] += weights[node] * arm.iter().map(|a| a * a).sum::<f64>();
             }
             for (numbers, Resultant { force, moment }) in sums.chunks_exact_mut(6).zip(resultants) {
                 numbers.copy_from_slice([force, moment].as_flattened());
@@ -135,13 +136,23 @@ impl TornProblem<'_> {
         forces
     }
 
-    /// Number of nodes of each body, copies included, and their mean.
+    /// One over the number of copies of each node of an own subdomain.
+    fn weights(&self, own: usize) -> Vec<f64> {
+        let mut weights = vec![1.0; self.subdomains[own].points.len()];
+        self.constraints.copies[own].iter().for_each(|&(node, count)| weights[node as usize] = 1.0 / f64::from(count));
+        weights
+    }
+
+    /// Number of nodes of each body, and their mean.
     fn centres(&self, bodies: usize) -> Vec<(f64, [f64; 3])> {
         let mut partial = vec![0.0; 4 * bodies * self.subdomains.len()];
-        for (subdomain, sums) in self.subdomains.iter().zip(partial.chunks_exact_mut((4 * bodies).max(1))) {
+        for (own, sums) in partial.chunks_exact_mut((4 * bodies).max(1)).enumerate() {
+            let subdomain = &self.subdomains[own];
             let sums = &mut sums[4 * subdomain.body..][..4];
-            sums[3] = subdomain.points.len() as f64;
-            subdomain.points.iter().for_each(|point| (0..3).for_each(|a| sums[a] += point[a]));
+            for (point, weight) in subdomain.points.iter().zip(self.weights(own)) {
+                (0..3).for_each(|a| sums[a] += weight * point[a]);
+                sums[3] += weight;
+            }
         }
         let sums = self.space.sum(&partial, 4 * bodies);
         sums.as_chunks::<4>().0.iter().map(|&[x, y, z, nodes]| (nodes, [x, y, z].map(|sum| sum / nodes))).collect()

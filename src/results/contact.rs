@@ -45,10 +45,9 @@ struct AtNodes {
 
 /// Fields of the nodes of these subdomains, one behind the other; `states` are those of the pairs whose rows are on this rank.
 pub fn fields(subdomains: &[Subdomain], touching: Touching, states: &[ContactState]) -> Vec<Field> {
-    let mut of_pair = vec![None; touching.pairs.len()];
-    states.iter().for_each(|state| of_pair[state.pair] = Some(state));
+    let known = Known::new(touching, states);
     let of = |wanted: &dyn Fn(usize) -> bool| {
-        let parts = subdomains.iter().map(|subdomain| at_nodes(subdomain, touching, &of_pair, wanted));
+        let parts = subdomains.iter().map(|subdomain| known.at_nodes(subdomain, wanted));
         parts.fold(AtNodes::nothing(0), AtNodes::and)
     };
     let AtNodes { pressure, gap, status } = of(&|_| true);
@@ -59,7 +58,9 @@ pub fn fields(subdomains: &[Subdomain], touching: Touching, states: &[ContactSta
     ];
     for contact in sharing(touching) {
         let pressure = of(&|pair| touching.pairs[pair].contact == contact).pressure;
-        fields.push(Field::scalar(&format!("contact_pressure_{}", touching.names[contact]), pressure));
+        // Names in HDF5 have no slash.
+        let name = touching.names[contact].replace('/', "_");
+        fields.push(Field::scalar(&format!("contact_pressure_{name}"), pressure));
     }
     fields
 }
@@ -77,31 +78,58 @@ fn sharing(Touching { names, pairs, masters }: Touching) -> Vec<usize> {
     (0..shares.len()).filter(|contact| shares[*contact]).collect()
 }
 
-fn at_nodes(
-    subdomain: &Subdomain,
-    Touching { pairs, masters, .. }: Touching,
-    of_pair: &[Option<&ContactState>],
-    wanted: &dyn Fn(usize) -> bool,
-) -> AtNodes {
-    let mut found = AtNodes::nothing(subdomain.nodes.len());
-    let pressure = |pair: usize| of_pair[pair].map_or(0.0, |state| state.force / pairs[pair].area);
-    for (pair, state) in of_pair.iter().enumerate() {
-        let Some(state) = state.filter(|_| pairs[pair].covered && wanted(pair)) else { continue };
-        if let Some(node) = subdomain.local_node(pairs[pair].slave) {
-            found.pressure[node] = found.pressure[node].max(pressure(pair));
-            // `min` takes the number of a number and none.
-            found.gap[node] = state.gap.min(found.gap[node]);
-            found.status[node] = found.status[node].max(i64::from(state.force > 0.0));
-        }
+/// What a rank knows of contact, by node.
+struct Known<'a> {
+    /// All nodes of both sides, ascending.
+    nodes: Vec<u64>,
+    /// Nodes of slave surfaces with the states of their conditions, ascending.
+    slaves: Vec<(u64, &'a ContactState)>,
+    /// Nodes of master surfaces, ascending.
+    masters: Vec<&'a MasterNode>,
+    /// Pressure of each condition; zero where its row is on other ranks.
+    pressures: Vec<f64>,
+}
+
+impl<'a> Known<'a> {
+    fn new(Touching { pairs, masters, .. }: Touching<'a>, states: &'a [ContactState]) -> Self {
+        let mut pressures = vec![0.0; pairs.len()];
+        states.iter().for_each(|state| pressures[state.pair] = state.force / pairs[state.pair].area);
+        let covered = states.iter().filter(|state| pairs[state.pair].covered);
+        let mut slaves: Vec<_> = covered.map(|state| (pairs[state.pair].slave, state)).collect();
+        slaves.sort_by_key(|(node, state)| (*node, state.pair));
+        let mut masters: Vec<&MasterNode> = masters.iter().collect();
+        masters.sort_by_key(|master| master.node);
+        let nodes = slaves.iter().map(|(node, _)| *node).chain(masters.iter().map(|master| master.node));
+        let mut nodes: Vec<u64> = nodes.collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        Self { nodes, slaves, masters, pressures }
     }
-    for master in masters.iter().filter(|master| wanted(master.pairs[0].0)) {
-        if let Some(node) = subdomain.local_node(master.node) {
-            let mean = master.pairs.iter().map(|&(pair, weight)| weight * pressure(pair)).sum();
-            found.pressure[node] = found.pressure[node].max(mean);
+
+    /// Contact at the nodes of a subdomain, of the conditions that are wanted.
+    fn at_nodes(&self, subdomain: &Subdomain, wanted: &dyn Fn(usize) -> bool) -> AtNodes {
+        let mut found = AtNodes::nothing(subdomain.nodes.len());
+        // Copies of a node show the same, also where a subdomain has no face of the surface.
+        let touches = |(_, node): &(usize, &u64)| self.nodes.binary_search(node).is_ok();
+        for (local, &node) in subdomain.nodes.iter().enumerate().filter(touches) {
+            let slaves = &self.slaves[self.slaves.partition_point(|(known, _)| *known < node)..];
+            let slaves = slaves.iter().take_while(|(known, _)| *known == node).map(|(_, state)| state);
+            for state in slaves.filter(|state| wanted(state.pair)) {
+                found.pressure[local] = found.pressure[local].max(self.pressures[state.pair]);
+                // `min` takes the number of a number and none.
+                found.gap[local] = state.gap.min(found.gap[local]);
+                found.status[local] = found.status[local].max(i64::from(state.force > 0.0));
+            }
+            let masters = &self.masters[self.masters.partition_point(|master| master.node < node)..];
+            let masters = masters.iter().take_while(|master| master.node == node);
+            for master in masters.filter(|master| wanted(master.pairs[0].0)) {
+                let mean = master.pairs.iter().map(|&(pair, weight)| weight * self.pressures[pair]).sum();
+                found.pressure[local] = found.pressure[local].max(mean);
+            }
         }
+        found.fill_middles(subdomain);
+        found
     }
-    found.fill_middles(subdomain);
-    found
 }
 
 impl AtNodes {

@@ -4,8 +4,8 @@ use super::limits::{self, Extent, Site};
 use crate::comm::Comm;
 use crate::constraint::{Support, dirichlet};
 use crate::contact::pairing::{self, Rule};
-use crate::contact::surface::{GatheredSurface, dot};
-use crate::contact::{Conditions, ContactError, ContactPair, MasterNode, corner, quadratic, rigid, sagitta};
+use crate::contact::surface::GatheredSurface;
+use crate::contact::{Conditions, ContactError, ContactPair, MasterNode, corner, rigid, sagitta};
 use crate::decomposition::Decomposition;
 use crate::results::summary::ContactRow;
 use crate::scene::{Scene, Sides, SurfaceName};
@@ -45,8 +45,6 @@ pub(super) fn pair(
         let (slave, Conditions { mut pairs, mut masters, .. }, rule) = match (&contact.sides, &surfaces[..]) {
             (Sides::Rigid { obstacle, .. }, [(_, slave), ..]) => {
                 let pairs = rigid::pair(number, name, slave, obstacle)?;
-                let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);
-                let pairs = quadratic::conditions(slave, pairs, along);
                 (0, Conditions { pairs, ..Conditions::default() }, "rigid")
             }
             (Sides::Named { .. }, [(_, slave), (_, master)]) => {

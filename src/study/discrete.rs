@@ -35,7 +35,7 @@ pub struct Discrete {
     pub pairs: Vec<ContactPair>,
     /// Nodes of all master surfaces that have slaves opposite.
     pub masters: Vec<MasterNode>,
-    /// Where each of them is.
+    /// Where each of the pairs is.
     pub sites: Vec<Site>,
     /// Least and largest coordinates of each body.
     pub extents: Vec<Extent>,

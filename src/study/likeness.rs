@@ -49,7 +49,9 @@ pub fn look(scene: &Scene, counted: &Counted, sizes: &mut Sizes, comm: &dyn Comm
     counted.can_be_cut().map_err(|error| Refused { error: error.into(), larger: 1 })?;
     let (coarse, discrete, larger) = at(LOOK).or_else(|_| at(8 * LOOK))?;
     let rows = conditions(scene, counted, (&coarse, &discrete), sizes, comm);
-    Ok(Look { contacts: rows, warnings: discrete.warnings, larger })
+    let seen =
+        |text: String| if larger == 1 { text } else { format!("{text} (seen with cells {larger} times as large)") };
+    Ok(Look { contacts: rows, warnings: discrete.warnings.into_iter().map(seen).collect(), larger })
 }
 
 /// How many times as large cells are of which no more than so many tetrahedra fill the bodies: a divisor of all numbers of

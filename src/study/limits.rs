@@ -64,7 +64,7 @@ pub(super) fn sites(surface: &GatheredSurface, pairs: &[ContactPair]) -> Vec<Sit
         triangle.iter().for_each(|&node| longest[node] = longest[node].max(edge));
     }
     let site = |pair: &ContactPair| {
-        let node = surface.nodes.binary_search(&pair.slave).expect("slave nodes are on the surface");
+        let node = surface.index(pair.slave, pair.part).expect("slave nodes are on the surface");
         Site { place: surface.points[node], facet: longest[node] }
     };
     pairs.iter().map(site).collect()
