@@ -33,15 +33,14 @@ pub fn pair(
     obstacle: &Obstacle,
 ) -> Result<Vec<ContactPair>, ContactError> {
     let nodes = surface.nodes.iter().zip(&surface.points).zip(surface.normals_and_areas());
-    let facing = |(((&slave, &point), (outward, area)), &part): (((&u64, &[f64; 3]), ([f64; 3], f64)), &u32)| {
+    let pairs = nodes.zip(&surface.parts).filter_map(|(((&slave, &point), (outward, area)), &part)| {
         let (normal, gap) = approach(obstacle, point, outward)?;
         let (slaves, masters) = (vec![(slave, 1.0)], Vec::new());
         let pair = ContactPair { contact, slave, part, slaves, masters, normal, gap, area, covered: true };
         (dot(normal, outward) > FACING).then_some(pair)
-    };
-    let pairs = nodes.zip(&surface.parts).filter_map(facing).collect();
+    });
     let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);
-    let mut pairs = quadratic::conditions(surface, pairs, along);
+    let mut pairs = quadratic::conditions(surface, pairs.collect(), along);
     // What is left of several parts of a node is one condition if it says the same.
     pairs.dedup_by(|next, first| {
         let same = (next.slave, next.normal, &next.slaves) == (first.slave, first.normal, &first.slaves);
