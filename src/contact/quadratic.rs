@@ -44,7 +44,9 @@ pub fn conditions(
     for face in &slave.quadratic {
         let nodes = face.map(|node| (slave.nodes[node], slave.parts[node]));
         (0..3).for_each(|k| {
-            ends.insert(nodes[3 + k], [nodes[k], nodes[(k + 1) % 3]]);
+            // In one order, whichever face comes last.
+            let [a, b] = [nodes[k], nodes[(k + 1) % 3]];
+            ends.insert(nodes[3 + k], [a.min(b), a.max(b)]);
         });
     }
     let of_node: HashMap<(u64, u32), &ContactPair> = pairs.iter().map(|pair| ((pair.slave, pair.part), pair)).collect();

@@ -1,7 +1,9 @@
 //! Contact that ends, is shared by several contacts, runs round an edge, or is none: what a user draws is what is computed.
 
 use crate::common::fields::Fields;
-use crate::common::{Run, assert_near, assert_residuals, number, scene_file, solve, solve_tightly, vector};
+use crate::common::{
+    Run, assert_near, assert_residuals, number, only_result, scene_file, solve, solve_tightly, vector,
+};
 
 /// A box: origin, size, cells.
 struct Block([f64; 3], [f64; 3], [usize; 3]);
@@ -321,6 +323,24 @@ fn surfaces_that_do_not_face_each_other_are_no_contact() {
             assert_eq!(run.code, 65, "{sides}: {}", run.stdout);
             assert!(run.stderr.contains("contact.joint: no node of the slave surface"), "{}", run.stderr);
         }
+    }
+}
+
+/// Both sides cut into parts, some of which the edge of the other side runs through.
+#[test]
+fn ranks_change_no_bit_where_contact_ends() {
+    let bottom = Block([0.0; 3], [1.0; 3], [4, 4, 3]);
+    let top = Block([0.37, -0.21, 1.0], [1.1, 1.3, 0.8], [6, 5, 3]);
+    let directory = tempfile::tempdir().unwrap();
+    for (element, sides) in [("tet10", NAMED[0]), ("hex8", NAMED[1])] {
+        let scene = scene_file(directory.path(), &stacked(&bottom, &top, element, sides));
+        let of = |ranks: usize| {
+            let run = solve(ranks, &scene, &["decomposition.subdomains=7"]).converged();
+            (only_result(run.summary()), Fields::read(&run.result()).of_points("contact_pressure").len())
+        };
+        let alone = of(1);
+        assert_eq!(alone, of(2), "{element}");
+        assert_eq!(alone, of(3), "{element}");
     }
 }
 
