@@ -79,13 +79,10 @@ pub fn pair(
     }
     let reach = reach(&parts, slave.nodes.len());
     let is_held = |node: usize| is_held(normals[node].0, held[node]);
-    let mut active: Vec<bool> = (0..reach.len()).map(|node| reach[node] >= REACH && !is_held(node)).collect();
+    let active: Vec<bool> = (0..reach.len()).map(|node| reach[node] >= REACH && !is_held(node)).collect();
     let mut sums: BTreeMap<usize, Sums> = BTreeMap::new();
     parts.iter().for_each(|part| add(&mut sums, part, &active, master));
-    sums.retain(|&node, sums| {
-        active[node] = sums.whole > COVERED * normals[node].1;
-        active[node]
-    });
+    sums.retain(|&node, sums| sums.whole > COVERED * normals[node].1);
     let held = (0..reach.len()).filter(|&node| reach[node] >= REACH && is_held(node)).count();
     if sums.is_empty() {
         let name = name.to_owned();

@@ -78,8 +78,9 @@ const NUMBERS: usize = 20;
 impl TornProblem<'_> {
     /// What acts on each of so many bodies, and the largest imbalance, relative. Two collectives and a neighbour exchange.
     pub fn balance(&self, state: &State, lambda: &[f64], bodies: usize) -> (Vec<BodyBalance>, f64) {
-        let contacts = self.contact_forces(lambda);
-        let supports = self.support_forces(state, lambda);
+        let contacts = self.against(&self.of_contact(lambda));
+        let held = |kind| matches!(kind, Kind::Support { .. });
+        let supports = self.against(&self.along(&self.unbalanced(state, lambda), held));
         let centres = self.centres(bodies);
         let mut partial = vec![0.0; NUMBERS * bodies * self.subdomains.len()];
         for (own, sums) in partial.chunks_exact_mut((NUMBERS * bodies).max(1)).enumerate() {
@@ -115,24 +116,10 @@ impl TornProblem<'_> {
         (found, relative)
     }
 
-    /// `-B_I'lambda_I`.
-    fn contact_forces(&self, lambda: &[f64]) -> Torn {
-        let rows = self.constraints.rows.iter().zip(lambda);
-        let contact: Vec<f64> = rows.map(|(row, &l)| if row.is_inequality() { l } else { 0.0 }).collect();
+    /// `-B'` of values of the rows.
+    fn against(&self, rows: &[f64]) -> Torn {
         let mut forces = self.gather.zeros();
-        self.gather.add_transpose(-1.0, &contact, &mut forces);
-        forces
-    }
-
-    /// What supports take of `f - F(u) - B_I'lambda_I`, as forces on the bodies.
-    fn support_forces(&self, state: &State, lambda: &[f64]) -> Torn {
-        let mut rows = vec![0.0; self.gather.rows()];
-        self.gather.apply(&self.unbalanced(state, lambda), &mut rows);
-        for (value, row) in rows.iter_mut().zip(&self.constraints.rows) {
-            *value = if matches!(row.kind, Kind::Support { .. }) { *value / (row.length * row.length) } else { 0.0 };
-        }
-        let mut forces = self.gather.zeros();
-        self.gather.add_transpose(-1.0, &rows, &mut forces);
+        self.gather.add_transpose(-1.0, rows, &mut forces);
         forces
     }
 

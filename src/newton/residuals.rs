@@ -94,16 +94,15 @@ impl TornProblem<'_> {
 
     /// `f - F(u) - B_I'lambda_I`, torn: after adding up copies, minus the reactions.
     pub(super) fn unbalanced(&self, state: &State, lambda: &[f64]) -> Torn {
-        let contact: Vec<f64> = self
-            .constraints
-            .rows
-            .iter()
-            .zip(lambda)
-            .map(|(row, &l)| if row.is_inequality() { l } else { 0.0 })
-            .collect();
         let mut v = self.unbalance(state);
-        self.gather.add_transpose(-1.0, &contact, &mut v);
+        self.gather.add_transpose(-1.0, &self.of_contact(lambda), &mut v);
         v
+    }
+
+    /// `lambda_I`: the multipliers of contact, zeros in place of the others.
+    pub(super) fn of_contact(&self, lambda: &[f64]) -> Vec<f64> {
+        let rows = self.constraints.rows.iter().zip(lambda);
+        rows.map(|(row, &l)| if row.is_inequality() { l } else { 0.0 }).collect()
     }
 
     /// Force of each support on the bodies, `[support][component]`. Collective.
@@ -130,12 +129,17 @@ impl TornProblem<'_> {
     /// Removes from a torn vector its part along the rows of some kinds: those along gluing rows leave the mean over
     /// the copies, those along support rows nothing.
     fn remove(&self, v: &mut Torn, kinds: impl Fn(Kind) -> bool) {
+        self.gather.add_transpose(-1.0, &self.along(v, kinds), v);
+    }
+
+    /// What a torn vector is along the rows of some kinds: `B'` of it is that part of the vector.
+    pub(super) fn along(&self, v: &Torn, kinds: impl Fn(Kind) -> bool) -> Vec<f64> {
         let mut rows = vec![0.0; self.gather.rows()];
         self.gather.apply(v, &mut rows);
         for (value, row) in rows.iter_mut().zip(&self.constraints.rows) {
             *value = if kinds(row.kind) { *value / (row.length * row.length) } else { 0.0 };
         }
-        self.gather.add_transpose(-1.0, &rows, v);
+        rows
     }
 
     /// Squared norms over the nodes of the undecomposed mesh, of torn vectors whose copies all hold the mean: a node of

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use crate::bad_mesh;
 use crate::common::msh::Form;
+use crate::common::random::Random;
 use fetiplast::comm::solo::Solo;
 use fetiplast::mesh::gmsh::Msh;
 use fetiplast::monitor::timing::peak_rss_mb;
@@ -26,17 +27,7 @@ const MOST: f64 = 500.0;
 /// Cells of a mesh that is really made: a user may ask for a large one.
 const CELLS: usize = 5000;
 
-/// Marsaglia's xorshift.
-struct Random(u64);
-
 impl Random {
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % bound as u64) as usize
-    }
-
     /// One to four changes: a byte, a piece removed or repeated, a number put in place of another, the end cut off.
     fn changed(&mut self, input: &[u8]) -> Vec<u8> {
         const NUMBERS: [&str; 10] =

@@ -3,6 +3,7 @@
 //!
 //! `FETIPLAST_FUZZ_SCENES=500 cargo test --release --test program twins` tries as many; without it a few are tried as a test.
 
+use crate::common::random::Random;
 use fetiplast::comm::solo::Solo;
 use fetiplast::monitor::timing::Timer;
 use fetiplast::results::summary::Summary;
@@ -12,17 +13,7 @@ use fetiplast::study::{self, StudyError};
 /// Scenes where no number is stated.
 const FEW: usize = 60;
 
-/// Marsaglia's xorshift.
-struct Random(u64);
-
 impl Random {
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % bound as u64) as usize
-    }
-
     /// Uniform in a range, in steps of a thousandth of it.
     fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.below(1001) as f64 / 1000.0

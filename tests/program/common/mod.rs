@@ -3,6 +3,7 @@
 
 pub mod fields;
 pub mod msh;
+pub mod random;
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
