@@ -10,14 +10,15 @@ use faer::{Accum, Mat, Par};
 use fetiplast::assembly::stiffness;
 use fetiplast::comm::solo::Solo;
 use fetiplast::decomposition::Subdomain;
-use fetiplast::feti::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use fetiplast::feti::coarse::Coarse;
-use fetiplast::feti::factor::{Factors, analyse};
-use fetiplast::feti::gather::Gather;
-use fetiplast::feti::kernel::RigidModes;
-use fetiplast::feti::schur::Schur;
+use fetiplast::feti::dual::gather::Gather;
+use fetiplast::feti::inverse::factor::{Factors, analyse};
+use fetiplast::feti::inverse::kernel::RigidModes;
+use fetiplast::feti::inverse::schur::Schur;
+use fetiplast::model;
+use fetiplast::model::discrete::Discrete;
 use fetiplast::scene::Scene;
-use fetiplast::study::{self, Discrete};
+use fetiplast::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use serde_json::json;
 
 /// Subdomains a problem: as many as are solved together.
@@ -71,7 +72,7 @@ fn subdomain(cells: usize) {
     ];
     let scene = Scene::load("shear", 1, &sets).expect("the scene is sound");
     let Discrete { decomposition, materials, .. } =
-        study::discretise(&scene, &Solo).expect("it has a discrete problem");
+        model::discretise(&scene, &Solo).expect("it has a discrete problem");
     let subdomains = &decomposition.subdomains;
     assert_eq!(subdomains.len(), COUNT);
     let symbolic = analyse(subdomains);
@@ -165,7 +166,7 @@ fn coarse(side: usize) {
     ];
     let scene = Scene::load("two-blocks", 1, &sets).expect("the scene is sound");
     let Discrete { decomposition, constraints, .. } =
-        &study::discretise(&scene, &Solo).expect("it has a discrete problem");
+        &model::discretise(&scene, &Solo).expect("it has a discrete problem");
     let subdomains = &decomposition.subdomains;
     let gather =
         Gather::new(&Solo, &decomposition.shares, constraints, subdomains.iter().map(Subdomain::dofs).collect());

@@ -138,8 +138,8 @@ mod tests {
     use crate::comm::solo::Solo;
     use crate::comm::threads;
     use crate::fixture::{RANKS, two_bricks, two_bricks_by_metis};
+    use crate::model::discrete::{Discrete, discretise};
     use crate::scene::Scene;
-    use crate::study::{Discrete, discretise};
 
     fn discrete(scene: &Scene, comm: &dyn Comm) -> Discrete {
         discretise(scene, comm).expect("the scene has a discrete problem")

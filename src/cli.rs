@@ -23,16 +23,18 @@ use self::keeper::Signals;
 pub use self::resume::{Resume, resume};
 pub use self::solve::{Cascade, Solve, solve};
 pub use self::verify::{Verify, verify};
-use crate::bodies::MeshError;
+use crate::comm::agree::root_texts;
 use crate::comm::{Comm, Shares, decide, maximum, ordered_sum};
 use crate::heap::EXIT_MEMORY;
+use crate::model::ModelError;
+use crate::model::bodies::MeshError;
 use crate::monitor::stdout;
 use crate::monitor::timing::peak_rss_mb;
+use crate::record::summary::Summary;
+use crate::restart::state::NoStart;
 use crate::results::OutputError;
-use crate::results::agree::root_texts;
-use crate::results::summary::Summary;
 use crate::scene::{Scene, SceneError, library};
-use crate::study::{NoStart, StudyError};
+use crate::study::StudyError;
 
 /// Contact of elasto-plastic bodies in 3D by Total-FETI domain decomposition on MPI.
 #[derive(Debug, Parser)]
@@ -92,6 +94,12 @@ pub enum Failure {
     Scene(String),
     /// The scene has no discrete problem.
     #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The state to start from is none.
+    #[error(transparent)]
+    NoStart(#[from] NoStart),
+    /// The scene has no solution.
+    #[error(transparent)]
     Study(#[from] StudyError),
     /// The scene file cannot be read.
     #[error("{0}")]
@@ -129,10 +137,8 @@ impl Failure {
     /// Exit code (sysexits).
     pub fn code(&self) -> i32 {
         match self {
-            Self::Study(StudyError::Mesh(MeshError::Unreadable(_)) | StudyError::NoStart(NoStart::Missing { .. })) => {
-                74
-            }
-            Self::Scene(_) | Self::Study(_) => 65,
+            Self::Model(ModelError::Mesh(MeshError::Unreadable(_))) | Self::NoStart(NoStart::Missing { .. }) => 74,
+            Self::Scene(_) | Self::Model(_) | Self::NoStart(_) | Self::Study(_) => 65,
             Self::Input(_) | Self::Place(_) | Self::Output(_) | Self::Mute { .. } => 74,
             Self::Memory(_) => EXIT_MEMORY,
             Self::Stopped { .. } => 75,

@@ -2,24 +2,26 @@
 
 use faer::Mat;
 
-use crate::assembly::pattern::Pattern;
 use crate::assembly::stiffness;
 use crate::comm::{Comm, threads};
 use crate::constraint::Row;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
-use crate::feti::cholesky::Precision;
 use crate::feti::coarse::{Coarse, Floating};
-use crate::feti::factor::{Factors, analyse};
-use crate::feti::gather::Gather;
-use crate::feti::hybrid::Hybrid;
-use crate::feti::kernel::{self, RigidModes};
-use crate::feti::operator::DualOperator;
-use crate::feti::space::RowSpace;
+use crate::feti::dual::gather::Gather;
+use crate::feti::dual::operator::DualOperator;
+use crate::feti::dual::space::RowSpace;
+use crate::feti::inverse::factor::{Factors, analyse};
+use crate::feti::inverse::hybrid::Hybrid;
+use crate::feti::inverse::kernel;
+use crate::feti::inverse::kernel::RigidModes;
 use crate::material::Material;
+use crate::model;
+use crate::model::discrete::Discrete;
 use crate::random::Random;
 use crate::scene::Scene;
-use crate::study::{self, Discrete};
+use crate::sparse::cholesky::Precision;
+use crate::sparse::pattern::Pattern;
 
 /// Numbers of ranks to test on: one, even, odd, and more than [`two_bricks`] has subdomains.
 pub const RANKS: [usize; 4] = [1, 2, 3, 5];
@@ -153,7 +155,7 @@ pub struct Setup<'a> {
 
 impl<'a> Setup<'a> {
     pub fn new(scene: &Scene, comm: &'a dyn Comm) -> Self {
-        let discrete = study::discretise(scene, comm).expect("the scene has a discrete problem");
+        let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
         let Discrete { decomposition, constraints, .. } = &discrete;
         let subdomains = &decomposition.subdomains;
         let dofs = subdomains.iter().map(Subdomain::dofs).collect();

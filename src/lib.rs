@@ -6,7 +6,6 @@
 
 pub mod analytic;
 pub mod assembly;
-pub mod bodies;
 pub mod cascade;
 pub mod cli;
 pub mod comm;
@@ -19,14 +18,19 @@ pub mod feti;
 pub mod heap;
 pub mod material;
 pub mod mesh;
+pub mod model;
 pub mod monitor;
 pub mod newton;
 pub mod qp;
+pub mod record;
+pub mod restart;
 pub mod results;
 pub mod scene;
-pub mod simd;
+pub mod sizing;
+pub mod sparse;
 pub mod study;
 pub mod tensor;
+pub mod vector;
 pub mod verify;
 
 #[cfg(test)]

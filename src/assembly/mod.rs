@@ -6,13 +6,25 @@ pub mod flow;
 pub mod gradients;
 pub mod internal;
 pub mod loads;
-pub mod pattern;
 pub mod stiffness;
 pub mod stress;
 
+use crate::decomposition::Subdomain;
 use crate::element::{Nodal, Point};
-use crate::material::History;
+use crate::material::{History, Material};
 use crate::mesh::Elements;
+
+/// A subdomain with the law of its material and the committed history of its integration points, element by element; no histories
+/// at all mean that nothing ever yielded.
+#[derive(Clone, Copy)]
+pub struct Region<'a> {
+    /// Its mesh.
+    pub subdomain: &'a Subdomain,
+    /// Its material.
+    pub material: &'a Material,
+    /// What its points remember.
+    pub history: &'a [History],
+}
 
 /// Nodes and integration points of each element; nodes are at `places`. Cut and mesh were checked before: elements are
 /// sound here.

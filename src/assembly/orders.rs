@@ -5,13 +5,13 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use super::pattern::Pattern;
 use super::stiffness;
 use crate::decomposition::{Bodies, Shape, Subdomain, number_bodies};
 use crate::element::Kind;
 use crate::element::sample::{Sample, samples};
 use crate::material::Material;
 use crate::mesh::Brick;
+use crate::sparse::pattern::Pattern;
 use crate::tensor::{Voigt, apply, contract};
 
 pub const MATERIAL: Material = Material::elastic(1.0, 0.3);

@@ -1,11 +1,11 @@
 //! `K_k`: the tangent of a subdomain; at rest it is the elastic stiffness `K_e`.
 
-use super::pattern::Pattern;
 use super::{committed, displacements, integrated};
 use crate::decomposition::Subdomain;
 use crate::element::point::block;
 use crate::element::{Nodal, Point, by_kind};
 use crate::material::{History, Material};
+use crate::sparse::pattern::Pattern;
 use crate::tensor::Voigt;
 
 /// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed `history`, with

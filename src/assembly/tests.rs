@@ -1,5 +1,4 @@
 use super::{internal, loads, stiffness};
-use crate::assembly::pattern::Pattern;
 use crate::decomposition::Subdomain;
 use crate::fixture::{
     assert_close, block_diagonal, built_in, column, dense, elastic, on_ranks, same_on_any_ranks, two_bricks,
@@ -9,6 +8,7 @@ use crate::material::samples::STEEL;
 use crate::material::{History, Material};
 use crate::random::Random;
 use crate::scene::Scene;
+use crate::sparse::pattern::Pattern;
 
 /// A brick cut into boxes and into METIS parts, and a rod of one part.
 fn shapes() -> Vec<Scene> {

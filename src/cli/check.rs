@@ -5,15 +5,20 @@ use clap::Args;
 use super::room::Room;
 use super::{Failure, Source, describe_run, find};
 use crate::comm::Comm;
+use crate::model;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
+use crate::record::counts::{ContactRow, Sizes};
+use crate::record::summary::Summary;
+use crate::restart;
+use crate::results;
 use crate::results::replace::{self, Form};
-use crate::results::summary::{ContactRow, Sizes, Summary};
 use crate::scene::Scene;
-use crate::study::counts::Counted;
-use crate::study::memory::Memory;
-use crate::study::{self, Look, Refused, StudyError};
+use crate::sizing;
+use crate::sizing::counts::Counted;
+use crate::sizing::likeness::{Look, Refused};
+use crate::sizing::memory::Memory;
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -61,7 +66,7 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
         summary.memory_available_mb = available_mb;
         summary.mesh_reading_mb = reading_mb;
         describe_run(&mut summary, source, comm);
-        summary.write(comm, file)?;
+        results::write_json(comm, file, &summary)?;
     }
     Ok(0)
 }
@@ -78,14 +83,14 @@ struct Found {
 impl Found {
     /// By building the problem as solving does.
     fn from_built(scene: &Scene, comm: &dyn Comm) -> Result<Self, Failure> {
-        let discrete = study::discretise(scene, comm)?;
-        study::held(scene, &discrete, comm)?;
+        let discrete = model::discretise(scene, comm)?;
+        model::held::held(scene, &discrete, comm)?;
         if let Some(initial) = &scene.initial {
-            study::earlier(comm, scene, &discrete, initial).map_err(StudyError::from)?;
+            restart::state::earlier(comm, scene, &discrete, initial)?;
         }
         Ok(Self {
-            sizes: study::sizes(&discrete, comm),
-            memory: study::memory(scene, &discrete, comm),
+            sizes: sizing::sizes(&discrete, comm),
+            memory: sizing::memory(scene, &discrete, comm),
             contacts: discrete.contact_rows,
             warnings: discrete.warnings,
             reading_mb: discrete.reading_mb,
@@ -96,10 +101,11 @@ impl Found {
     fn from_counts(scene: &Scene, counted: &Counted, comm: &dyn Comm) -> Result<Self, Failure> {
         let mut sizes = counted.sizes();
         let refused = |Refused { error, larger }| match larger {
-            1 => Failure::Study(error),
+            1 => Failure::Model(error),
             _ => Failure::Scene(format!("{error} (seen with cells {larger} times as large)")),
         };
-        let Look { contacts, mut warnings, larger } = study::look(scene, counted, &mut sizes, comm).map_err(refused)?;
+        let Look { contacts, mut warnings, larger } =
+            sizing::look(scene, counted, &mut sizes, comm).map_err(refused)?;
         if let Some(initial) = &scene.initial {
             warnings.push(format!("initial.result = {:?} is not looked at: the scene is too large", initial.result));
         }

@@ -16,10 +16,10 @@ use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
 use crate::monitor::timing::Timer;
+use crate::restart::checkpoint::Unfit;
 use crate::results::checkpoint::{self, Checkpoint};
 use crate::results::provenance::{COMMIT, VERSION};
 use crate::scene;
-use crate::study::checkpoint::Unfit;
 
 /// Arguments of `resume`.
 #[derive(Debug, Args)]

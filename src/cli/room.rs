@@ -9,7 +9,7 @@ use super::Failure;
 use crate::comm::{Comm, all_gather_text};
 use crate::monitor::machine::available_mb;
 use crate::results::provenance::host;
-use crate::study::memory::Memory;
+use crate::sizing::memory::Memory;
 
 /// So many times what is left is refused.
 const BEYOND: f64 = 1.5;

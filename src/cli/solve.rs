@@ -13,6 +13,8 @@ use super::resume::{labels, unfit};
 use super::room::Room;
 use super::{Failure, Found, Source, describe_run, find, run_name, values, warnings};
 use crate::comm::Comm;
+use crate::comm::agree::agree;
+use crate::model;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::json::JsonLines;
@@ -20,15 +22,18 @@ use crate::monitor::metered::Metered;
 use crate::monitor::table::{Phase, PhaseTable};
 use crate::monitor::timing::Timer;
 use crate::monitor::trace;
-use crate::results::OutputError;
-use crate::results::agree::agree;
+use crate::record::counts::CommunicationRow;
+use crate::record::rows::CascadeRow;
+use crate::record::summary::Summary;
+use crate::restart;
+use crate::restart::checkpoint::{Unfit, pack, unpack};
 use crate::results::checkpoint::{self, Checkpoint};
 use crate::results::replace::{self, Form};
-use crate::results::summary::{CascadeRow, CommunicationRow, Summary};
 use crate::results::vtkhdf;
+use crate::results::{self, OutputError};
 use crate::scene::{Preconditioner, Qp, Scene};
-use crate::study::checkpoint::{Unfit, pack, unpack};
-use crate::study::counts::Counted;
+use crate::sizing;
+use crate::sizing::counts::Counted;
 use crate::study::{self, Begin, StudyError};
 
 /// Arguments of `solve`.
@@ -172,7 +177,7 @@ pub(super) fn carry_out(
     let keeper = Keeper::new(comm, timer, checkpoints, signals, kept);
     let run = Run { comm, timer, keeper: &keeper, scene: scene.to_toml(), ignore_memory };
 
-    let mut coarser: Option<(study::Discrete, study::Solved)> = None;
+    let mut coarser: Option<(model::Discrete, study::Solved)> = None;
     while let [level, _, ..] = plan.levels[..] {
         let watch = timer.total_seconds();
         let solved = match found.at_level(level, &plan.source.sets) {
@@ -191,7 +196,7 @@ pub(super) fn carry_out(
         let (discrete, solved) = match solved {
             Ok(Some(solved)) => solved,
             // A level that is too coarse for the scene is left out.
-            Ok(None) | Err(Failure::Study(_)) => continue,
+            Ok(None) | Err(Failure::Model(_) | Failure::Study(_)) => continue,
             Err(end) => return Err(end),
         };
         let Summary { newton_iterations, counters, sizes, converged, .. } = &solved.summary;
@@ -224,7 +229,7 @@ pub(super) fn carry_out(
     summary.work = table.work();
     summary.communication = communication(&table);
     summary.time_total = Some(table.total_seconds);
-    summary.write(comm, &summary_file)?;
+    results::write_json(comm, &summary_file, summary)?;
     if let Some(directory) = &trace {
         trace::write(comm, directory, timer)?;
     }
@@ -270,20 +275,20 @@ impl Run<'_> {
         &self,
         plan: &mut Plan,
         scene: &Scene,
-        coarser: Option<(study::Discrete, study::Solved)>,
+        coarser: Option<(model::Discrete, study::Solved)>,
         checkpoint: Option<Checkpoint>,
         monitor: &mut Monitor,
-    ) -> Result<(study::Discrete, study::Solved), Failure> {
+    ) -> Result<(model::Discrete, study::Solved), Failure> {
         let Self { comm, timer, keeper, .. } = *self;
         if let Some((coarse, solved)) = &coarser {
             plan.yielding = timer.time("interpolation", || study::expected_yielding(comm, (coarse, solved), scene));
         }
         let yielding = plan.yielding.as_deref();
-        let mut discrete = timer.time("discretisation", || study::discretise_expecting(scene, yielding, comm))?;
+        let mut discrete = timer.time("discretisation", || model::discretise_expecting(scene, yielding, comm))?;
         if let Some(counted) = Counted::of_read(scene, &discrete.bodies) {
             discrete.warnings.extend(make_room(comm, &counted, self.ignore_memory)?);
         }
-        let sizes = study::sizes(&discrete, comm);
+        let sizes = sizing::sizes(&discrete, comm);
         let subdomains = sizes.subdomains;
         let (name, level) = (plan.source.scene.clone(), plan.levels[0]);
         monitor.event(&Event::Sizes { scene: name, level, ranks: comm.size(), sizes });
@@ -305,12 +310,12 @@ impl Run<'_> {
             }
             begin = Begin::At(Box::new(standing));
         } else if let Some(initial) = &scene.initial {
-            let earlier = timer.time("initial state", || study::earlier(comm, scene, &discrete, initial));
-            begin = Begin::After(earlier.map_err(StudyError::from)?);
+            let earlier = timer.time("initial state", || restart::state::earlier(comm, scene, &discrete, initial));
+            begin = Begin::After(earlier?);
         }
         let monitor = RefCell::new(monitor);
         let tell = |event: Event| monitor.borrow_mut().event(&event);
-        let pause = |standing: &dyn Fn() -> study::Standing| {
+        let pause = |standing: &dyn Fn() -> restart::Standing| {
             let write = |path: &Path| {
                 let (mut texts, arrays) = pack(comm, &discrete, standing());
                 texts.extend(labels(plan, &self.scene));

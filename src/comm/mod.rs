@@ -8,6 +8,7 @@
 //! ranks hand over one partial value per subdomain, and [`ordered_sum`] adds them in subdomain order on rank 0.
 //! It does not know subdomains beyond that: ranks own consecutive blocks of them, so rank order is subdomain order.
 
+pub mod agree;
 pub mod solo;
 pub mod threads;
 pub mod world;

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+use super::Kind;
 use super::components::Components;
 use super::contact::Side;
 use super::ties::Ties;
@@ -107,6 +108,12 @@ impl Constraints {
     /// Slots of a row.
     pub fn slots(&self, row: usize) -> std::ops::Range<usize> {
         self.slot_begin[row] as usize..self.slot_begin[row + 1] as usize
+    }
+
+    /// Adds to multipliers those of the rows of some kinds whose forces have this `change` by `B`.
+    pub fn add_forces(&self, change: &[f64], of: impl Fn(Kind) -> bool, lambda: &mut [f64]) {
+        let rows = self.rows.iter().zip(change).zip(lambda).filter(|((row, _), _)| of(row.kind));
+        rows.for_each(|((row, change), l)| *l += change / (row.length * row.length));
     }
 }
 

@@ -164,7 +164,7 @@ fn a_pair_fixed_on_both_sides_along_the_normal_has_no_row() {
     let flush = two_bricks(&["body.upper.brick.origin.0=0.0", "support.right.surface=upper.xmin"]);
     for ranks in RANKS {
         on_ranks(&flush, ranks, |setup| {
-            let contact = crate::study::sizes(&setup.discrete, setup.comm).contact_rows;
+            let contact = crate::sizing::sizes(&setup.discrete, setup.comm).contact_rows;
             assert_eq!((setup.discrete.pairs.len(), contact), (15, 12));
         });
     }

@@ -7,8 +7,9 @@
 
 use std::collections::BTreeMap;
 
-use super::surface::{difference, dot, unit};
+use super::surface::unit;
 use super::{ContactError, ContactPair};
+use crate::vector::{difference, dot};
 
 /// Distance of a unit vector to the others or to their span from which a direction counts as independent.
 const INDEPENDENT: f64 = 1e-6;

@@ -18,7 +18,7 @@ const WHOLE: f64 = 1.0 - 1e-9;
 pub fn places(covered: &[[f64; 3]], centre: [f64; 3]) -> Option<[[f64; 3]; 3]> {
     let hull = hull(covered.iter().map(|p| [p[0], p[1]]).collect());
     let from = [centre[0], centre[1]];
-    let way = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]].map(|corner| length(&hull, from, corner));
+    let way = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]].map(|corner| share_inside(&hull, from, corner));
     if way.iter().all(|way| *way >= WHOLE) {
         return None;
     }
@@ -34,7 +34,7 @@ pub fn places(covered: &[[f64; 3]], centre: [f64; 3]) -> Option<[[f64; 3]; 3]> {
 const ROUNDING: f64 = 1e-12;
 
 /// How much of the way from a point inside to another one is in a convex polygon, whose corners turn counter-clockwise.
-fn length(polygon: &[Point], from: Point, to: Point) -> f64 {
+fn share_inside(polygon: &[Point], from: Point, to: Point) -> f64 {
     let sides = polygon.iter().zip(polygon.iter().cycle().skip(1));
     sides.fold(1.0, |shortest: f64, (&a, &b)| {
         let (here, there) = (turn(a, b, from), turn(a, b, to));

@@ -6,10 +6,11 @@
 
 use std::collections::HashSet;
 
-use super::surface::{FACING, GatheredSurface, difference, dot};
+use super::surface::{FACING, GatheredSurface};
 use super::tree::BallTree;
 use super::{Conditions, ContactPair, MasterNode};
 use crate::mesh::surface;
+use crate::vector::{difference, dot};
 
 /// How far, in edge lengths of the master surface, a master node may lie beside the slave node's normal.
 const TOLERANCE: f64 = 1e-6;

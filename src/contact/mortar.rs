@@ -24,9 +24,10 @@ use std::collections::BTreeMap;
 
 use super::dual::{self, DualFunctions};
 use super::opposite::{Face, INSIDE, IntegrationPoint, Opposite, Seen, faces, functions};
-use super::surface::{GatheredSurface, difference, dot};
+use super::surface::GatheredSurface;
 use super::{Conditions, ContactError, ContactPair, MasterNode, edge};
 use crate::mesh::surface;
+use crate::vector::{difference, dot};
 
 /// Share of its surface that a slave node must have opposite a master.
 const COVERED: f64 = 1e-6;

@@ -5,9 +5,10 @@
 //! quadratic. Pieces that look away from the slave, or overlap so deep that they are the far side of a body, are not opposite.
 
 use super::clip::{Point, barycentric, intersection, turn};
-use super::surface::{FACING, GatheredSurface, difference, dot};
+use super::surface::{FACING, GatheredSurface};
 use super::tree::BallTree;
 use crate::mesh::surface;
+use crate::vector::{difference, dot};
 
 /// Share of a slave triangle below which a piece is round-off.
 const SLIVER: f64 = 1e-12;

@@ -15,7 +15,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::ContactPair;
-use super::surface::{GatheredSurface, difference, dot};
+use super::surface::GatheredSurface;
+use crate::vector::{difference, dot};
 
 /// What a corner gets of the function of an edge's middle.
 pub const SHARE: f64 = 0.2;

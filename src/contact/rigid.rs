@@ -9,9 +9,10 @@
 //! carries no condition, nor does a node beside a height field. Where the surface has an edge, both sides of it may face the
 //! obstacle: a node there has one condition, on the area of both.
 
-use super::surface::{GatheredSurface, difference, dot, unit};
+use super::surface::{GatheredSurface, unit};
 use super::{ContactError, ContactPair, quadratic};
 use crate::scene::Obstacle;
+use crate::vector::{difference, dot};
 
 /// Cosine between the direction to the obstacle and the outward normal from which a surface faces the obstacle.
 const FACING: f64 = 1e-6;

@@ -13,8 +13,9 @@
 use std::collections::BTreeMap;
 
 use super::ContactPair;
-use super::surface::{GatheredSurface, difference, dot};
+use super::surface::GatheredSurface;
 use crate::mesh::surface::{area, normal, quadratic_normal};
+use crate::vector::{difference, dot};
 
 /// Kinks (radians) that are round-off, and that are edges of the body.
 const KINKS: [f64; 2] = [1e-3, 0.8];

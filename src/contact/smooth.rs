@@ -5,8 +5,8 @@
 //! it. Faces around a node belong to one part if their normals there differ by at most [`SHARPEST`], or if a chain of such faces
 //! leads from one to the other. Curved surfaces in facets stay whole, edges of parts and chamfers of 45 degrees do not.
 
-use super::surface::dot;
 use crate::mesh::surface::{area_vector, quadratic_normal};
+use crate::vector::dot;
 
 /// Angle between faces from which they meet at an edge, in degrees: that of most mesh generators.
 pub const SHARPEST: f64 = 40.0;

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use super::{quadratic, smooth};
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Subdomain;
-pub use crate::mesh::near::{difference, dot};
 use crate::mesh::surface::area_vector;
+use crate::vector::dot;
 
 /// Triangles and nodes of a surface, the same on every rank.
 pub struct GatheredSurface {

@@ -1,6 +1,6 @@
 //! A tree of balls around triangles: which of them may meet a line.
 
-use super::surface::{difference, dot};
+use crate::vector::{difference, dot};
 
 /// Triangles a leaf holds at most.
 const LEAF: usize = 4;

@@ -8,7 +8,6 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use metis::Graph;
 use metis::option::{Contig, Seed};
@@ -21,6 +20,7 @@ use crate::mesh::Elements;
 use crate::mesh::brick::indices;
 use crate::mesh::connectivity::split_into_pieces;
 use crate::mesh::faces::{Neighbours, key};
+use crate::sparse::ordering::alone;
 
 /// How much dearer it is to cut between two elements at a contact surface.
 const AT_CONTACT: i32 = 5;
@@ -86,13 +86,6 @@ pub(crate) fn own_subdomains(
         });
     }
     (clusters, shares, own)
-}
-
-/// Lets one thread at a time into METIS, which draws from the C library's one generator: without it, results would depend
-/// on what other threads do.
-pub(crate) fn alone() -> MutexGuard<'static, ()> {
-    static LOCK: Mutex<()> = Mutex::new(());
-    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// How a body is cut.

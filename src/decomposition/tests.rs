@@ -8,8 +8,9 @@ use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by
 use crate::mesh::brick::indices;
 use crate::mesh::surface::area_vector;
 use crate::mesh::{Brick, Elements, Face, SolidMesh};
+use crate::model::discrete::discretise;
 use crate::scene::Scene;
-use crate::study::{discretise, sizes};
+use crate::sizing::sizes;
 
 /// Bricks and METIS, one body and two, few elements a part and many.
 fn scenes() -> Vec<Scene> {

@@ -59,7 +59,6 @@ fn hash(subdomain: &Subdomain) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::feti::preconditioner::boundaries;
     use crate::fixture::{RANKS, on_ranks, two_bricks, two_bricks_by_metis};
 
     #[test]
@@ -93,7 +92,7 @@ mod tests {
         let long = two_bricks(&["body.lower.brick.cells=[12, 2, 2]", "body.upper.brick.cells=[2, 2, 2]"]);
         for ranks in RANKS {
             let found = on_ranks(&long, ranks, |setup| {
-                let boundaries = boundaries(&setup.gather, setup.subdomains().len());
+                let boundaries = setup.gather.boundaries();
                 let body = |s: &Subdomain| s.body;
                 let alike = alike(setup.comm, setup.subdomains(), &boundaries);
                 setup.subdomains().iter().map(body).zip(alike).collect::<Vec<_>>()

@@ -2,6 +2,7 @@
 //! Method, 3.A). Locks in isochoric flow, as every conforming linear tetrahedron does; nothing here cures that.
 
 use super::{DEGENERATE, Nodal, Point};
+use crate::vector::{cross, dot};
 
 /// Values of the shape functions at the integration point.
 pub const VALUES: [[f64; 4]; 1] = [[0.25; 4]];
@@ -9,15 +10,7 @@ pub const VALUES: [[f64; 4]; 1] = [[0.25; 4]];
 /// Six times the signed volume, and the edges from corner 0.
 fn edges(corners: &[[f64; 3]; 4]) -> (f64, [[f64; 3]; 3]) {
     let [a, b, c] = [1, 2, 3].map(|n| std::array::from_fn(|i| corners[n][i] - corners[0][i]));
-    (dot(&a, &cross(&b, &c)), [a, b, c])
-}
-
-fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    (dot(a, cross(b, c)), [a, b, c])
 }
 
 /// Six times the signed volume over the cube of the longest edge, times the root of two: at most 1, for the regular
@@ -38,7 +31,7 @@ pub fn shape(corners: &[[f64; 3]; 4]) -> f64 {
 pub fn points(corners: &Nodal<4>) -> Option<[Point<4>; 1]> {
     (shape(corners) > DEGENERATE).then(|| {
         let (determinant, [a, b, c]) = edges(corners);
-        let [b, c, d] = [cross(&b, &c), cross(&c, &a), cross(&a, &b)].map(|g| g.map(|x| x / determinant));
+        let [b, c, d] = [cross(b, c), cross(c, a), cross(a, b)].map(|g| g.map(|x| x / determinant));
         let a = std::array::from_fn(|i| -(b[i] + c[i] + d[i]));
         [Point { weight: determinant / 6.0, gradients: [a, b, c, d], dilatation: None }]
     })

@@ -2,18 +2,7 @@
 //! chapter 5). Squares of distances, so that nothing is rooted in vain.
 
 use super::surface::{area, area_vector};
-
-type Point = [f64; 3];
-
-/// `a - b`.
-pub fn difference(a: Point, b: Point) -> Point {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-/// Scalar product.
-pub fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
+use crate::vector::{Point, difference, dot};
 
 /// Square of the distance of two points.
 pub fn of_points(a: Point, b: Point) -> f64 {

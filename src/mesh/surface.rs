@@ -5,6 +5,7 @@
 //! sixth of the whole area and of that of the triangle of the corner and its neighbours: the mean of both ways to cut the
 //! face into triangles.
 
+use crate::vector::length;
 /// Half the cross product of two edges: area times unit normal.
 pub fn area_vector(corners: &[[f64; 3]; 3]) -> [f64; 3] {
     let [a, b]: [[f64; 3]; 2] = [1, 2].map(|n| std::array::from_fn(|i| corners[n][i] - corners[0][i]));
@@ -13,13 +14,13 @@ pub fn area_vector(corners: &[[f64; 3]; 3]) -> [f64; 3] {
 
 /// Area of a triangle.
 pub fn area(corners: &[[f64; 3]; 3]) -> f64 {
-    length(&area_vector(corners))
+    length(area_vector(corners))
 }
 
 /// Outward unit normal, or `None` if the triangle has no area.
 pub fn normal(corners: &[[f64; 3]; 3]) -> Option<[f64; 3]> {
     let vector = area_vector(corners);
-    let area = length(&vector);
+    let area = length(vector);
     (area > 0.0).then(|| vector.map(|c| c / area))
 }
 
@@ -60,7 +61,7 @@ pub fn areas(face: &[[f64; 3]]) -> Vec<f64> {
         [a, b, c, ab, bc, ca] => {
             let mut areas = vec![0.0; 6];
             for (values, normal) in quadratic_points(&[a, b, c, ab, bc, ca]) {
-                areas.iter_mut().zip(values).for_each(|(area, value)| *area += value * length(&normal));
+                areas.iter_mut().zip(values).for_each(|(area, value)| *area += value * length(normal));
             }
             areas
         }
@@ -96,11 +97,6 @@ pub fn quartic() -> impl Iterator<Item = (f64, [f64; 3])> {
         let (twice, once, weight) = RULE[k / 3];
         (weight, std::array::from_fn(|a| if a == k % 3 { once } else { twice }))
     })
-}
-
-/// Length of a vector.
-pub fn length(v: &[f64; 3]) -> f64 {
-    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use super::table::PhaseTable;
-use crate::results::summary::{ContactRow, Errors, NewtonRow, Residuals, Sizes};
+use crate::record::counts::{ContactRow, Sizes};
+use crate::record::rows::NewtonRow;
+use crate::record::state::{Errors, Residuals};
 
 /// Something that happened and is worth telling; numbers are those of all ranks together.
 #[derive(Clone, Debug, Serialize)]

@@ -52,7 +52,8 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::results::summary::{NewtonRow, Residuals};
+    use crate::record::rows::NewtonRow;
+    use crate::record::state::Residuals;
 
     #[test]
     fn every_line_is_an_event() {

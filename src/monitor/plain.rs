@@ -5,7 +5,9 @@
 
 use super::events::{Event, Sink};
 use super::table::{Phase, PhaseTable, Spread};
-use crate::results::summary::{ContactRow, Errors, NewtonRow, Residuals, Sizes};
+use crate::record::counts::{ContactRow, Sizes};
+use crate::record::rows::NewtonRow;
+use crate::record::state::{Errors, Residuals};
 
 /// Writes log lines.
 #[derive(Default)]

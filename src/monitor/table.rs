@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::timing::{Messages, Spent, Timer, peak_rss_mb};
 use crate::comm::{Comm, Shares, all_gather_text, maximum, ordered_sum};
-use crate::results::summary::Work;
+use crate::record::counts::Work;
 
 /// The phases of all ranks.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -6,7 +6,7 @@
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant, SystemTime};
 
-use crate::results::summary::Work;
+use crate::record::counts::Work;
 
 /// Collects the seconds that one rank spends in named phases and in messages.
 #[derive(Clone, Debug)]

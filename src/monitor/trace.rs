@@ -8,8 +8,8 @@ use serde_json::json;
 
 use super::timing::Timer;
 use crate::comm::Comm;
+use crate::comm::agree::agree;
 use crate::results::OutputError;
-use crate::results::agree::agree;
 use crate::results::target;
 
 /// Where rank `rank` writes.

@@ -8,15 +8,7 @@
 use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::constraint::Kind;
 use crate::feti::Torn;
-
-/// A force and its moment about a point (force, force times length).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Resultant {
-    /// The force.
-    pub force: [f64; 3],
-    /// The moment.
-    pub moment: [f64; 3],
-}
+use crate::record::state::Resultant;
 
 /// What acts on a body; moments are about the mean of its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,25 +23,6 @@ pub struct BodyBalance {
     pub gross: f64,
     /// Root of the mean squared distance of the nodes from their mean (length).
     pub radius: f64,
-}
-
-impl Resultant {
-    fn add(&mut self, force: &[f64], arm: [f64; 3]) {
-        for a in 0..3 {
-            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-            self.force[a] += force[a];
-            self.moment[a] += arm[b] * force[c] - arm[c] * force[b];
-        }
-    }
-
-    fn of(numbers: &[f64]) -> Self {
-        Self { force: [numbers[0], numbers[1], numbers[2]], moment: [numbers[3], numbers[4], numbers[5]] }
-    }
-
-    fn plus(self, other: Self) -> Self {
-        let sum = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|i| a[i] + b[i]);
-        Self { force: sum(self.force, other.force), moment: sum(self.moment, other.moment) }
-    }
 }
 
 impl BodyBalance {

@@ -17,7 +17,7 @@
 //!
 //! where every term is positive and is computed without cancellation, and where `K_s` may be any tangent, as tangents are at
 //! most `K_e` and so `K_e^+` is at most `K_s^+` on forces in balance. (Where supports hold a subdomain still,
-//! [`crate::feti::supported`], `w` is taken among those that they allow, which gives no less.) We start from `v = u`, where only the first and the last
+//! [`crate::feti::dual::supported`], `w` is taken among those that they allow, which gives no less.) We start from `v = u`, where only the first and the last
 //! are not zero, and let `v = v + K^+ rho`: Newton's method for the torn bodies under the forces `lambda`, whose `rho` vanishes
 //! quadratically, so that the gap tends to the true duality gap of `u` and `lambda`. In linear elasticity (`r = 1`, `K = K_e`)
 //! the first value is that already. Each turn costs one `K^+` and no conjugate gradients; there are four at most, and the least
@@ -34,12 +34,13 @@
 //! rounding: of `B u`, and of the factors, for which a hundredth is added.
 
 use super::StepSolver;
-use super::problem::{State, TornProblem, dot};
-use super::recover;
+use super::problem::{State, TornProblem};
 use crate::assembly::internal;
 use crate::feti::Torn;
-use crate::feti::face::CoarseFace;
+use crate::feti::coarse::face::CoarseFace;
+use crate::feti::coarse::recover;
 use crate::monitor::timing::Timer;
+use crate::vector::dot;
 
 /// Turns of Newton's method for the torn bodies.
 const TURNS: usize = 4;

@@ -1,14 +1,14 @@
 //! The dual problem in the words of the QP solvers: inner products, and `F`, `P`, `M` as one quadratic function, on all
 //! rows or on those of an active set.
 
-use super::motion;
 use crate::constraint::Constraints;
 use crate::feti::coarse::Coarse;
-use crate::feti::face::CoarseFace;
-use crate::feti::operator::DualOperator;
+use crate::feti::coarse::face::CoarseFace;
+use crate::feti::coarse::motion;
+use crate::feti::coarse::projector::Projector;
+use crate::feti::dual::operator::DualOperator;
+use crate::feti::dual::space::RowSpace;
 use crate::feti::preconditioner::Preconditioner;
-use crate::feti::projector::Projector;
-use crate::feti::space::RowSpace;
 use crate::monitor::timing::Timer;
 use crate::qp::active_set::Face;
 use crate::qp::quadratic::{Operator, Projection, Quadratic, Space};

@@ -6,24 +6,17 @@
 //! FETI and the QP solvers meet.
 
 pub mod balance;
-pub mod basis;
 pub mod certificate;
 pub mod committed;
 pub mod damping;
 pub mod dual;
-pub mod equilibrium;
 pub mod errors;
 pub mod forcing;
-pub mod held;
 pub mod loading;
-pub mod motion;
 pub mod problem;
 pub mod program;
-pub mod recover;
-pub mod refine;
 pub mod residuals;
 pub mod step;
-pub mod tangents;
 
 pub use certificate::Certificate;
 pub use committed::Committed;

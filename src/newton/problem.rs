@@ -1,17 +1,19 @@
 //! The torn nonlinear problem: `J`, `F(u)`, and the admissible set.
 
+use crate::vector::dot;
 use std::cell::RefCell;
 
 use super::committed::Committed;
+use crate::assembly::Region;
 use crate::assembly::internal::{self, Terms};
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
-use crate::feti::coupling::Coupling;
-use crate::feti::gather::Gather;
-use crate::feti::kernel::RigidModes;
-use crate::feti::space::RowSpace;
+use crate::feti::dual::coupling::Coupling;
+use crate::feti::dual::gather::Gather;
+use crate::feti::dual::space::RowSpace;
+use crate::feti::inverse::kernel::RigidModes;
 use crate::material::Material;
 
 /// What one rank holds of the problem.
@@ -64,12 +66,18 @@ pub struct State {
 /// sums of (in the energy norm, of its root): where bodies move without strain, all that is there is round-off.
 pub(super) const SIGNIFICANT: f64 = 1e-8;
 
-/// `x'y` of local vectors.
-pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
-}
-
 impl TornProblem<'_> {
+    /// Own subdomains, each with its material and history.
+    pub fn regions(&self) -> Vec<Region<'_>> {
+        (0..self.subdomains.len()).map(|own| self.region(own)).collect()
+    }
+
+    /// An own subdomain with its material and history.
+    pub fn region(&self, own: usize) -> Region<'_> {
+        let (subdomain, material) = (&self.subdomains[own], &self.materials[own]);
+        Region { subdomain, material, history: self.committed.history(own) }
+    }
+
     /// Without plastic material, one step solves the problem.
     pub fn is_linear(&self) -> bool {
         !self.yields
@@ -127,12 +135,6 @@ impl TornProblem<'_> {
         let norms: Vec<f64> = self.space.sum(&partial, 3).into_iter().map(f64::sqrt).collect();
         let size = (norms[1] + norms[2]).max(SIGNIFICANT * terms.energy.sqrt()).max(self.committed.sizes.elastic_norm);
         if norms[0] == 0.0 { 0.0 } else { norms[0] / size }
-    }
-
-    /// Adds to multipliers those of the rows of some kinds whose forces have this `change` by `B`.
-    pub fn add_forces(&self, change: &[f64], of: impl Fn(Kind) -> bool, lambda: &mut [f64]) {
-        let rows = self.constraints.rows.iter().zip(change).zip(lambda).filter(|((row, _), _)| of(row.kind));
-        rows.for_each(|((row, change), l)| *l += change / (row.length * row.length));
     }
 
     /// `c - B u`: what is left until each constraint holds. One neighbour exchange.

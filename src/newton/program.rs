@@ -8,9 +8,9 @@
 use super::dual::{Dual, DualFace, Multipliers};
 use super::forcing::Forcing;
 use super::problem::TornProblem;
+use crate::feti::coarse::face::CoarseFace;
+use crate::feti::coarse::projector::Projector;
 use crate::feti::coarse::{Coarse, Floating};
-use crate::feti::face::CoarseFace;
-use crate::feti::projector::Projector;
 use crate::qp::bounds::Bounds;
 use crate::qp::mprgp::Expansion;
 use crate::qp::pcpg::Pcpg;

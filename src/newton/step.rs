@@ -1,29 +1,30 @@
 //! One Newton step: tangents, factors, the dual quadratic program, and back to a displacement.
 
+use crate::vector::dot;
 use std::sync::Arc;
 
-use super::basis::Bases;
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
-use super::held::Held;
-use super::motion;
-use super::problem::{State, TornProblem, dot};
+use super::problem::{State, TornProblem};
 use super::program::{Found, ProgramSettings, ProgramState, Programs};
-use super::recover;
-use super::refine::refine;
-use super::tangents::{Factorising, Tangents};
 use crate::assembly::flow::{self, Flow};
 use crate::constraint::Kind;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
-use crate::feti::cholesky::Precision;
-use crate::feti::factor::NotDefinite;
-use crate::feti::operator::DualOperator;
+use crate::feti::coarse::motion;
+use crate::feti::coarse::projector::Projector;
+use crate::feti::coarse::recover;
+use crate::feti::dual::held::Held;
+use crate::feti::dual::operator::DualOperator;
+use crate::feti::inverse::basis::Bases;
+use crate::feti::inverse::factor::NotDefinite;
+use crate::feti::inverse::refine::refine;
+use crate::feti::inverse::tangents::{Factorising, Tangents};
 use crate::feti::preconditioner::Preconditioner;
-use crate::feti::projector::Projector;
-use crate::feti::scaling::Scaling;
+use crate::feti::preconditioner::scaling::Scaling;
 use crate::monitor::timing::Timer;
 use crate::qp::{Outcome, Statistics};
+use crate::sparse::cholesky::Precision;
 
 /// Residual of the subdomains' problems that is small enough whatever the accuracy of the step.
 const EXACT: f64 = 1e-8;
@@ -70,13 +71,13 @@ pub struct StepSolver<'a> {
     /// Directions of flow in each own subdomain.
     flows: Vec<Flow>,
     tangents: Tangents,
-    /// For each own subdomain, unknowns that supports may keep at zero ([`crate::feti::supported`]).
+    /// For each own subdomain, unknowns that supports may keep at zero ([`crate::feti::dual::supported`]).
     supported: Vec<Vec<u32>>,
 }
 
 impl<'a> StepSolver<'a> {
     /// On factors and a projector set up for the problem's subdomains; `twins` numbers those that have congruent ones, `supported`
-    /// tells what their supports may keep at zero ([`crate::feti::supported`]).
+    /// tells what their supports may keep at zero ([`crate::feti::dual::supported`]).
     pub fn new(
         operator: DualOperator<'a>,
         projector: Projector<'a>,
@@ -114,7 +115,7 @@ impl<'a> StepSolver<'a> {
         self.programs.resume(&self.projector.coarse, programs, lambda);
         self.operator.factors.set_precision(precision);
         let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
-        let outcome = self.tangents.remake(problem, bases, &mut on);
+        let outcome = self.tangents.remake(&problem.regions(), bases, &mut on);
         agree_on(outcome.err(), problem)
     }
 
@@ -200,7 +201,7 @@ impl<'a> StepSolver<'a> {
         let mut forces = problem.unbalance(state);
         let slack = problem.slack(u);
         let mut open = slack.clone();
-        let lifted = self.held().map(|held| held.lift(problem, &mut forces, &mut open));
+        let lifted = self.held(problem).map(|held| held.lift(&mut forces, &mut open));
         let coarse = &self.projector.coarse;
         let warm = timer.time("coarse problem", || {
             let balance = recover::resultants(problem.subdomains, problem.modes, coarse, &forces);
@@ -246,7 +247,7 @@ impl<'a> StepSolver<'a> {
         if let Some(held) = self.programs.held() {
             let coarse = &self.projector.coarse;
             let back = timer.time("coarse problem", || motion::amplitudes(held, coarse, problem.space, &defect));
-            recover::add_rigid_motion(problem, coarse, -1.0, &back, &mut du);
+            recover::add_rigid_motion(problem.subdomains, problem.modes, coarse, -1.0, &back, &mut du);
         }
         for (du, lifted) in du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {
             *du += lifted;
@@ -260,23 +261,29 @@ impl<'a> StepSolver<'a> {
     /// of a cluster, and what supports carry that hold subdomains still.
     fn add_hidden(&self, problem: &TornProblem, state: (&Torn, &Torn), [lambda, balanced]: [&mut Vec<f64>; 2]) {
         self.add_bonds(problem, [&mut *lambda, &mut *balanced]);
-        if let Some(held) = self.held() {
-            held.add_reactions(problem, state, [lambda, balanced]);
+        if let Some(held) = self.held(problem) {
+            held.add_reactions(state, [lambda, balanced]);
         }
     }
 
     /// Adds to multipliers what balances each member of a cluster.
     pub(super) fn add_bonds<const N: usize>(&self, problem: &TornProblem, multipliers: [&mut Vec<f64>; N]) {
         if let Some(bonds) = self.operator.bonds() {
-            multipliers.into_iter().for_each(|lambda| problem.add_forces(&bonds, |kind| kind == Kind::Gluing, lambda));
+            multipliers
+                .into_iter()
+                .for_each(|lambda| problem.constraints.add_forces(&bonds, |kind| kind == Kind::Gluing, lambda));
         }
     }
 
     /// The subdomains that supports hold still; `None` if no rank has any.
-    fn held(&self) -> Option<Held<'_>> {
+    fn held<'s>(&'s self, problem: &'s TornProblem) -> Option<Held<'s>> {
         let is_active = self.preconditioner.as_ref().is_some_and(|preconditioner| preconditioner.deluxe.is_active());
-        (is_active && !self.operator.is_hybrid())
-            .then(|| Held { factors: &self.operator.factors, tangents: self.tangents.values() })
+        (is_active && !self.operator.is_hybrid()).then(|| Held {
+            factors: &self.operator.factors,
+            tangents: self.tangents.values(),
+            constraints: problem.constraints,
+            gather: problem.gather,
+        })
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.
@@ -309,7 +316,8 @@ impl<'a> StepSolver<'a> {
         timer: &Timer,
     ) -> Result<usize, String> {
         let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
-        let (factorised, failure) = self.tangents.update(problem, (u, state, &self.flows), left, &mut on);
+        let (factorised, failure) =
+            self.tangents.update(&problem.regions(), (u, &state.yielding, &self.flows), left, &mut on);
         agree_on(failure, problem)?;
         if self.operator.is_hybrid() {
             let loose = timer.time("clusters", || self.operator.update_clusters()).err();

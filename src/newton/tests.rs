@@ -3,9 +3,11 @@ use std::sync::Mutex;
 
 use crate::comm::threads;
 use crate::fixture::two_bricks;
+use crate::model;
 use crate::monitor::timing::Timer;
+use crate::record::summary::Summary;
+use crate::restart;
 use crate::results::piece::{Field, Piece, Values};
-use crate::results::summary::Summary;
 use crate::scene::Scene;
 use crate::study;
 
@@ -26,7 +28,7 @@ fn plastic(sets: &[&str]) -> Scene {
 /// What is known after the solve, and the displacements of all ranks.
 fn solve(scene: &Scene, ranks: usize) -> (Summary, Vec<u64>) {
     let parts = threads::run(ranks, |comm| {
-        let discrete = study::discretise(scene, comm).expect("the scene has a discrete problem");
+        let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
         let solved =
             study::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("the bodies are held");
         let field = solved.piece.point_data.into_iter().find(|field| field.name == "displacement");
@@ -162,9 +164,9 @@ fn numbers_without_end_are_an_outcome() {
 /// All that a solve leaves: the summary without its times, and all fields, of all ranks.
 fn leave(scene: &Scene, ranks: usize, begin: impl Fn(usize) -> study::Begin + Sync, stop: usize) -> Left {
     let parts = threads::run(ranks, |comm| {
-        let discrete = study::discretise(scene, comm).expect("the scene has a discrete problem");
+        let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
         let (asked, stood) = (Cell::new(0), RefCell::new(None));
-        let pause = |standing: &dyn Fn() -> study::Standing| {
+        let pause = |standing: &dyn Fn() -> restart::Standing| {
             asked.set(asked.get() + 1);
             let stops = asked.get() == stop;
             if stops {
@@ -182,7 +184,7 @@ fn leave(scene: &Scene, ranks: usize, begin: impl Fn(usize) -> study::Begin + Sy
 
 struct Left {
     solved: Option<Vec<(Summary, Piece)>>,
-    stood: Option<Vec<study::Standing>>,
+    stood: Option<Vec<restart::Standing>>,
 }
 
 impl Left {

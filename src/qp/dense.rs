@@ -1,6 +1,7 @@
 //! For tests: dense matrices, a projector by Gram-Schmidt, random numbers, and the truth by trying all active sets.
 
 use super::quadratic::{Joined, Operator, Projection, Space};
+pub use crate::vector::dot;
 
 /// Plain inner products.
 pub struct Plain;
@@ -123,7 +124,7 @@ impl Null {
 impl Projection for Null {
     fn project(&mut self, x: &mut [f64]) {
         for row in &self.rows {
-            let c = dot(row, x);
+            let c = dot(row, &*x);
             x.iter_mut().zip(row).for_each(|(x, r)| *x -= c * r);
         }
     }
@@ -132,10 +133,6 @@ impl Projection for Null {
 /// A quadratic function without preconditioner.
 pub fn function<'a>(a: &'a mut Matrix, null: &'a mut Null) -> Joined<'a> {
     Joined { operator: a, projection: null, preconditioner: None }
-}
-
-pub fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
 pub fn distance(x: &[f64], y: &[f64]) -> f64 {

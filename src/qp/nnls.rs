@@ -4,6 +4,7 @@
 //! joins, columns that would turn negative leave. At the end the residual r = b - A x has A'r <= 0 and x'A'r = 0. So if r is
 //! not zero no nonnegative x reaches b, and r shows why: b'r = |r|^2 > 0, but no column goes along r (Farkas).
 
+use crate::vector::{dot, length};
 /// Share of |b| that a unit column must have along the residual to join, and share of a column that must be new.
 const ROUNDING: f64 = 1e-12;
 
@@ -18,8 +19,8 @@ pub struct Solution {
 
 /// Solves the problem for the columns of A, each as long as b.
 pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
-    let norms: Vec<f64> = columns.iter().map(|column| norm(column)).collect();
-    let threshold = ROUNDING * norm(b);
+    let norms: Vec<f64> = columns.iter().map(|column| length(column)).collect();
+    let threshold = ROUNDING * length(b);
     let mut x = vec![0.0; columns.len()];
     // Columns with a positive share, and those that rounding keeps from joining at the present residual.
     let (mut joined, mut barred) = (Vec::new(), vec![false; columns.len()]);
@@ -56,7 +57,7 @@ pub fn least_distance(rows: &[Vec<f64>], bounds: &[f64]) -> Option<Vec<f64>> {
     target[n] = 1.0;
     let Solution { residual, .. } = solve(&columns, &target);
     let last = residual[n];
-    (norm(&residual) > FEASIBLE).then(|| residual[..n].iter().map(|r| -scale * r / last).collect())
+    (length(&residual) > FEASIBLE).then(|| residual[..n].iter().map(|r| -scale * r / last).collect())
 }
 
 /// A smaller residual means that the constraints contradict each other.
@@ -101,12 +102,12 @@ fn least_squares(columns: &[Vec<f64>], chosen: &[usize], b: &[f64]) -> Option<Ve
                 *share += along;
             }
         }
-        let length = norm(&rest);
-        if length <= ROUNDING * norm(&columns[k]) {
+        let left = length(&rest);
+        if left <= ROUNDING * length(&columns[k]) {
             return None;
         }
-        rest.iter_mut().for_each(|x| *x /= length);
-        shares.push(length);
+        rest.iter_mut().for_each(|x| *x /= left);
+        shares.push(left);
         directions.push(rest);
         triangle.push(shares);
     }
@@ -118,14 +119,6 @@ fn least_squares(columns: &[Vec<f64>], chosen: &[usize], b: &[f64]) -> Option<Ve
         }
     }
     Some(x)
-}
-
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
-}
-
-fn norm(x: &[f64]) -> f64 {
-    dot(x, x).sqrt()
 }
 
 fn subtract(x: &mut [f64], factor: f64, y: &[f64]) {
@@ -145,13 +138,13 @@ mod tests {
 
     /// The smallest residual over all sets of columns whose least squares are not negative.
     fn enumerated(columns: &[Vec<f64>], b: &[f64]) -> f64 {
-        let mut best = norm(b);
+        let mut best = length(b);
         for set in 1..1_usize << columns.len() {
             let chosen: Vec<usize> = (0..columns.len()).filter(|k| set >> k & 1 == 1).collect();
             let Some(x) = least_squares(columns, &chosen, b).filter(|x| x.iter().all(|x| *x >= 0.0)) else { continue };
             let mut residual = b.to_vec();
             chosen.iter().zip(x).for_each(|(&k, x)| subtract(&mut residual, x, &columns[k]));
-            best = best.min(norm(&residual));
+            best = best.min(length(&residual));
         }
         best
     }
@@ -166,12 +159,12 @@ mod tests {
             columns[6] = vec![0.0; 4];
             columns[7] = columns[0].iter().zip(&columns[1]).map(|(a, b)| a + b).collect();
             let Solution { x, residual } = solve(&columns, &b);
-            assert!((norm(&residual) - enumerated(&columns, &b)).abs() < 1e-9, "{seed}");
+            assert!((length(&residual) - enumerated(&columns, &b)).abs() < 1e-9, "{seed}");
             for (x, column) in x.iter().zip(&columns) {
                 let along = dot(column, &residual);
                 assert!(*x >= 0.0 && along < 1e-9 && (x * along).abs() < 1e-9);
             }
-            if norm(&residual) > 1e-9 { missed += 1 } else { reached += 1 }
+            if length(&residual) > 1e-9 { missed += 1 } else { reached += 1 }
         }
         assert!(reached > 20 && missed > 20, "{reached} {missed}");
     }
@@ -181,7 +174,7 @@ mod tests {
         let (columns, b) = random(6, 30, 3);
         let scaled: Vec<Vec<f64>> =
             (0..).zip(&columns).map(|(k, c)| c.iter().map(|x| x * 10_f64.powi(k - 15)).collect()).collect();
-        let [plain, scaled] = [solve(&columns, &b), solve(&scaled, &b)].map(|s| norm(&s.residual));
+        let [plain, scaled] = [solve(&columns, &b), solve(&scaled, &b)].map(|s| length(&s.residual));
         assert!((plain - scaled).abs() < 1e-9, "{plain} {scaled}");
     }
 
@@ -190,7 +183,7 @@ mod tests {
         let (rows, bounds) = ([vec![1.0, 0.0], vec![-1.0, -1.0]], [5.0, -2.0]);
         let nearest = least_distance(&rows, &bounds).expect("there are such points");
         assert!(nearest.iter().all(|y| (y - 1.0).abs() < 1e-12), "{nearest:?}");
-        assert_eq!(least_distance(&rows, &[5.0, 0.0]).map(|y| norm(&y)), Some(0.0));
+        assert_eq!(least_distance(&rows, &[5.0, 0.0]).map(|y| length(&y)), Some(0.0));
         assert_eq!(least_distance(&[vec![1.0], vec![-1.0]], &[-1.0, -1.0]), None);
         let mut found_any = 0;
         for seed in 0..50 {
@@ -199,13 +192,13 @@ mod tests {
             let fits = |y: &[f64]| rows.iter().zip(&bounds).all(|(row, bound)| dot(row, y) <= bound + 1e-9);
             let found = least_distance(&rows, &bounds);
             assert!(found.as_ref().is_none_or(|found| fits(found)), "{seed}");
-            found_any += usize::from(found.as_ref().is_some_and(|found| norm(found) > 0.0));
+            found_any += usize::from(found.as_ref().is_some_and(|found| length(found) > 0.0));
             // No point of a cloud is nearer, or fits at all where there is no solution.
-            let distance = found.map_or(f64::INFINITY, |found| norm(&found));
+            let distance = found.map_or(f64::INFINITY, |found| length(&found));
             let mut random = Random::new(seed);
             for _ in 0..2000 {
                 let y: [f64; 3] = random.vector(3.0);
-                assert!(!fits(&y) || norm(&y) >= distance - 1e-9, "{seed}");
+                assert!(!fits(&y) || length(&y) >= distance - 1e-9, "{seed}");
             }
         }
         assert!(found_any > 10, "{found_any}");

@@ -126,7 +126,7 @@ impl Projection for Torn {
     fn project(&mut self, x: &mut [f64]) {
         x.iter_mut().zip(&self.kept).for_each(|(x, kept)| *x *= f64::from(*kept));
         for row in &self.basis {
-            axpy(-dot(&row.inside, x), &row.inside, x);
+            axpy(-dot(&row.inside, &*x), &row.inside, x);
         }
     }
 }
@@ -165,13 +165,13 @@ impl Face for Torn {
 
     fn restore(&mut self, x: &mut [f64]) {
         for row in &self.basis {
-            axpy(row.right - dot(&row.inside, x), &row.inside, x);
+            axpy(row.right - dot(&row.inside, &*x), &row.inside, x);
         }
     }
 
     fn gaps(&mut self, residual: &mut [f64]) {
         for row in &self.basis {
-            axpy(-dot(&row.inside, residual), &row.full, residual);
+            axpy(-dot(&row.inside, &*residual), &row.full, residual);
         }
     }
 }

@@ -9,12 +9,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::OutputError;
-use super::agree::{on_root, root_texts};
 use super::hdf5::{Number, SharedFile};
 use super::piece::{Field, Values};
 use super::replace::replace;
 use super::seal;
 use super::target::{Target, behind_links};
+use crate::comm::agree::{on_root, root_texts};
 use crate::comm::{Comm, all_gather_u64};
 
 /// Writes a checkpoint, once what is there is the one before. Names of arrays and texts have the form `group/name`; rank 0's

@@ -20,7 +20,7 @@ use hdf5_metno_sys::h5i::hid_t;
 use hdf5_metno_sys::h5p::{H5FD_mpio_xfer_t, H5P_DEFAULT, H5Pclose, H5Pcreate, H5Pset_dxpl_mpio};
 use hdf5_metno_sys::h5s::{H5S_SELECT_SET, H5Sclose, H5Screate_simple, H5Sselect_hyperslab, H5Sselect_none};
 
-use super::agree::agree;
+use crate::comm::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
 
 /// A file open on every rank of `comm`: a new one to be written, or a written one to be compared. All methods are

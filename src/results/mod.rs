@@ -5,16 +5,12 @@
 //! [`target`] tells files from devices and pipes. A failure on one rank is the same [`OutputError`] on all.
 //! It computes nothing: what is to be written comes in ready.
 
-pub mod agree;
 pub mod checkpoint;
-pub mod contact;
-pub mod fields;
 pub mod hdf5;
 pub mod piece;
 pub mod provenance;
 pub mod replace;
 pub mod seal;
-pub mod summary;
 pub mod target;
 pub mod vtkhdf;
 
@@ -56,4 +52,53 @@ pub enum OutputError {
 pub fn write_json(comm: &dyn Comm, path: &Path, object: &impl Serialize) -> Result<(), OutputError> {
     let text = serde_json::to_string_pretty(object).unwrap_or_default() + "\n";
     replace::text(comm, path, &text)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::{OutputError, write_json};
+    use crate::comm::threads;
+    use crate::record::state::{Residuals, State};
+    use crate::record::summary::Summary;
+    use serde_json::Value;
+
+    #[test]
+    fn numbers_read_back_bitwise_and_absent_ones_are_null() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("new/summary.json");
+        let summary = Summary {
+            converged: Some(true),
+            state: State {
+                energy: Some(-1245323411.382042),
+                max_displacement: Some(0.1 + 0.2),
+                residuals: Residuals { equilibrium: Some(f64::NAN), gluing: Some(5e-324), ..Residuals::default() },
+                reactions: BTreeMap::from([("left".into(), [1.0 / 3.0, -0.0, 1e300])]),
+                ..State::default()
+            },
+            ..Summary::default()
+        };
+        threads::run(3, |comm| write_json(comm, &path, &summary).unwrap());
+        let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(read["energy"].as_f64(), summary.state.energy);
+        assert_eq!(read["max_displacement"].as_f64(), Some(0.1 + 0.2));
+        assert_eq!(read["residual_gluing"].as_f64(), Some(5e-324));
+        assert_eq!(read["reactions"]["left"][0].as_f64(), Some(1.0 / 3.0));
+        for key in ["residual_equilibrium", "residual_gap", "smalse_iterations", "error", "contact_force"] {
+            assert_eq!(read.get(key), Some(&Value::Null), "{key}");
+        }
+        assert_eq!(read["dual_dofs"], 0);
+    }
+
+    #[test]
+    fn an_impossible_place_is_everybodys_error() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("file");
+        std::fs::write(&file, "kept").unwrap();
+        let outcomes = threads::run(3, |comm| write_json(comm, &file.join("summary.json"), &Summary::default()));
+        assert!(matches!(&outcomes[0], Err(OutputError::Write { reason, .. }) if reason.contains("rank 0")));
+        assert!(outcomes.iter().all(|o| *o == outcomes[0]));
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+    }
 }

@@ -14,9 +14,9 @@ use rustix::fs::{Access, FallocateFlags, access, fallocate};
 use rustix::io::Errno;
 
 use super::OutputError;
-use super::agree::{agree, on_root};
 use super::target::{self, Target};
 use crate::comm::Comm;
+use crate::comm::agree::{agree, on_root};
 
 /// What is written, and so where it may go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

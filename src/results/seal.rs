@@ -9,7 +9,7 @@ use std::io::{self, Write};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use super::agree::{agree, on_root};
+use crate::comm::agree::{agree, on_root};
 use crate::comm::{Comm, all_gather_u64};
 
 const MARK: &[u8; 16] = b"fetiplast seal 1";

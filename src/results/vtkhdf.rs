@@ -9,10 +9,10 @@
 use std::path::Path;
 
 use super::OutputError;
-use super::agree::{agree, on_root, root_texts};
 use super::hdf5::SharedFile;
 use super::piece::{Field, Piece, Values};
 use super::replace::replace;
+use crate::comm::agree::{agree, on_root, root_texts};
 use crate::comm::solo::Solo;
 use crate::comm::{Comm, all_gather_u64};
 

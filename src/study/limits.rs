@@ -17,122 +17,30 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::discrete::Discrete;
+use super::contact::ContactState;
 use crate::assembly::gradients;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::Kind;
-use crate::contact::ContactPair;
-use crate::contact::sagitta::Unresolved;
-use crate::contact::surface::{GatheredSurface, difference, dot};
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
+use crate::model::discrete::Discrete;
+use crate::model::extent::{Site, diagonal, short, shown};
 use crate::newton::loading::At;
 use crate::newton::{Solution, TornProblem};
-use crate::results::contact::ContactState;
-use crate::results::summary::{Extreme, Measures, StepRow};
+use crate::record::rows::StepRow;
+use crate::record::state::{Extreme, Measures};
 use crate::scene::Scene;
-
-/// Least and largest coordinates of a body.
-pub type Extent = [[f64; 3]; 2];
+use crate::vector::{dot, length};
 
 const STRAIN: f64 = 0.1;
 const ROTATION: f64 = 0.1;
 const DISPLACEMENT: f64 = 0.1;
 const SLIDING: f64 = 1.0;
 const CLOSED_GAP: f64 = 0.1;
-const OVERLAP: f64 = 0.1;
 const ROUNDING: f64 = 1e-3;
 
 /// Strains below are round-off.
 const NO_STRAIN: f64 = 1e-12;
-
-/// Where a contact condition is.
-#[derive(Clone, Copy, Debug)]
-pub struct Site {
-    /// Place of the slave node.
-    pub place: [f64; 3],
-    /// Longest edge of the facets around it.
-    pub facet: f64,
-}
-
-/// The sites of conditions on a surface.
-pub(super) fn sites(surface: &GatheredSurface, pairs: &[ContactPair]) -> Vec<Site> {
-    let mut longest = vec![0.0_f64; surface.nodes.len()];
-    for triangle in &surface.triangles {
-        let side = |k: usize| difference(surface.points[triangle[k]], surface.points[triangle[(k + 1) % 3]]);
-        let edge = (0..3).map(|k| length(side(k))).fold(0.0, f64::max);
-        triangle.iter().for_each(|&node| longest[node] = longest[node].max(edge));
-    }
-    let site = |pair: &ContactPair| {
-        let node = surface.index(pair.slave, pair.part).expect("slave nodes are on the surface");
-        Site { place: surface.points[node], facet: longest[node] }
-    };
-    pairs.iter().map(site).collect()
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    dot(v, v).sqrt()
-}
-
-fn diagonal([low, high]: &Extent) -> f64 {
-    length(difference(*high, *low))
-}
-
-/// Extents of all bodies, from the subdomains of all ranks. Collective.
-pub(super) fn extents(comm: &dyn Comm, subdomains: &[Subdomain], bodies: usize) -> Vec<Extent> {
-    const NONE: Extent = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    let mut mine = vec![NONE; bodies];
-    let add = |[low, high]: &mut Extent, [l, h]: [[f64; 3]; 2]| {
-        (0..3).for_each(|a| (low[a], high[a]) = (low[a].min(l[a]), high[a].max(h[a])));
-    };
-    for subdomain in subdomains {
-        subdomain.points.iter().for_each(|&x| add(&mut mine[subdomain.body], [x, x]));
-    }
-    let numbers: Vec<f64> = mine.as_flattened().as_flattened().to_vec();
-    let all = comm.all_gather(&numbers, &vec![numbers.len(); comm.size()]);
-    let mut extents = vec![NONE; bodies];
-    for (k, &[a, b, c, d, e, f]) in all.as_chunks::<6>().0.iter().enumerate() {
-        add(&mut extents[k % bodies], [[a, b, c], [d, e, f]]);
-    }
-    extents
-}
-
-/// What to tell of a contact whose sides overlap too deeply at the start; `bodies` are those of its sides.
-pub(super) fn overlap(
-    name: &str,
-    pairs: &[ContactPair],
-    sites: &[Site],
-    bodies: &[(&String, &Extent)],
-) -> Option<String> {
-    let relative = |(pair, site): (&ContactPair, &Site)| {
-        let along = |[low, high]: &Extent| (0..3).map(|a| pair.normal[a].abs() * (high[a] - low[a])).sum::<f64>();
-        let thin = bodies.iter().map(|(name, extent)| (along(extent), *name)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let depth = -pair.gap;
-        (depth > OVERLAP * thin.0).then_some((depth / thin.0, depth, thin, site.place))
-    };
-    let found = pairs.iter().zip(sites).filter_map(relative);
-    let (share, depth, (extent, body), place) = found.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
-    Some(format!(
-        "contact.{name}: its sides overlap by {} near {}, {} of the {} that body {body} extends there; small strains allow \
-         {OVERLAP} of it: check the places of the bodies, gap and clearance",
-        short(depth),
-        shown(place),
-        short(share),
-        short(extent),
-    ))
-}
-
-/// What to tell of a contact whose facets do not resolve its gaps.
-pub(super) fn unresolved(name: &str, found: &Unresolved, conditions: usize) -> String {
-    format!(
-        "contact.{name}: its surfaces are curved alike and their meshes do not match. Where it closes, pressures follow the \
-         facets, which stand off the surfaces by up to {}: in {} of {conditions} conditions the distance is less than half a \
-         facet's width. Say the distance that is meant, as in clearance = {}, the mean of the surfaces",
-        short(found.sagitta),
-        found.conditions,
-        short(found.distance),
-    )
-}
 
 /// The largest value so far, and where.
 #[derive(Clone, Copy)]
@@ -219,7 +127,7 @@ fn add_body(worst: &mut [Worst], subdomain: &Subdomain, u: &[f64], diagonal: f64
         worst[1].add(rotation, body, place);
         worst[3].add(strain * diagonal, body, place);
     });
-    for (u, &place) in u.as_chunks().0.iter().zip(&subdomain.points) {
+    for (u, &place) in u.as_chunks::<3>().0.iter().zip(&subdomain.points) {
         worst[2].add(length(*u) / diagonal, body, || place);
     }
 }
@@ -330,15 +238,6 @@ pub(super) fn warnings(scene: &Scene, rows: &[StepRow]) -> Vec<String> {
         ),
     ];
     told.into_iter().flatten().collect()
-}
-
-/// A number with four digits.
-fn short(x: f64) -> String {
-    format!("{x:.3e}").parse::<f64>().map_or_else(|_| x.to_string(), |x| x.to_string())
-}
-
-fn shown(place: [f64; 3]) -> String {
-    format!("[{}]", place.map(short).join(", "))
 }
 
 #[cfg(test)]

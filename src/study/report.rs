@@ -1,17 +1,20 @@
 //! What is told of a solution: rows of the log, contact states, the summary.
 
-use super::discrete::Discrete;
+use super::contact::ContactState;
 use super::limits;
-use super::sizes::sizes;
 use crate::comm::Comm;
 use crate::constraint::Kind;
-use crate::newton::balance::{BodyBalance, Resultant};
-use crate::newton::equilibrium::Unheld;
+use crate::model::discrete::Discrete;
+use crate::model::held::load_step;
+use crate::newton::balance::BodyBalance;
 use crate::newton::loading::{At, Followed};
 use crate::newton::{self, Solution, StepRecord, TornProblem};
-use crate::results::contact::ContactState;
-use crate::results::summary::{self, Counters, NewtonRow, Residuals, State, StepRow, Summary};
+use crate::record::counts::{ContactRow, Counters};
+use crate::record::rows::{NewtonRow, StepRow};
+use crate::record::state::{Acting, Errors, Measures, Residuals, State};
+use crate::record::summary::Summary;
 use crate::scene::{self, Scene};
+use crate::sizing::sizes::sizes;
 
 /// Where in the history an attempt leads, in words; nothing where all acts at once.
 pub(super) fn place(scene: &Scene, at: At) -> Option<String> {
@@ -26,32 +29,6 @@ pub(super) fn place(scene: &Scene, at: At) -> Option<String> {
         text += &format!(", up to {:.4} of the step", at.fraction);
     }
     Some(text)
-}
-
-fn load_step(scene: &Scene, stage: usize) -> Option<String> {
-    let name = &scene.step.get(stage)?.name;
-    Some(if name.is_empty() { format!("load step {}", stage + 1) } else { format!("load step {} ({name})", stage + 1) })
-}
-
-/// Why a scene is refused whose supports, contacts and loads do not hold its bodies.
-pub(super) fn unheld(scene: &Scene, unheld: &Unheld) -> String {
-    let Unheld { body, piece, motion, stage, driven } = unheld;
-    let mut body = scene.body.keys().nth(*body).expect("it is one of the bodies").clone();
-    if let Some([x, y, z]) = piece {
-        body += &format!(", its piece around ({x:.6}, {y:.6}, {z:.6})");
-    }
-    let when = load_step(scene, *stage).map_or(String::new(), |step| format!(" at the end of {step}"));
-    if *driven {
-        format!(
-            "body.{body}: loads drive its {motion}{when}, and neither supports nor contacts resist: add a support, or a load \
-             that presses it against a contact"
-        )
-    } else {
-        format!(
-            "body.{body}: nothing determines its {motion}{when}: supports leave it free, and no load presses it against a \
-             contact on that way; add a support"
-        )
-    }
 }
 
 /// An increment in numbers; `von_mises` is the largest stress on this rank.
@@ -177,7 +154,7 @@ pub(super) fn summarise(
         steps: rows,
         state,
         sizes,
-        ..summary::Summary::default()
+        ..Summary::default()
     }
 }
 
@@ -217,26 +194,21 @@ fn state(
             balance: Some(residual_balance),
         },
         balance: scene.body.keys().cloned().zip(balance.iter().map(acting)).collect(),
-        errors: summary::Errors {
+        errors: Errors {
             duality_gap: solution.errors.as_ref().map(|errors| errors.gap),
             algebraic: solution.errors.as_ref().map(|errors| errors.algebraic),
             algebraic_is_bound: solution.errors.as_ref().map(|errors| errors.is_bound),
             discretisation: solution.errors.as_ref().map(|errors| errors.discretisation),
             ended_by_accuracy: Some(solution.ended_by_accuracy),
         },
-        measures: summary::Measures::default(),
+        measures: Measures::default(),
     }
 }
 
 /// What acts on a body.
-fn acting(body: &BodyBalance) -> summary::Acting {
-    let resultant = |Resultant { force, moment }| summary::Resultant { force, moment };
-    summary::Acting {
-        loads: resultant(body.loads),
-        supports: resultant(body.supports),
-        contacts: resultant(body.contacts),
-        unbalanced: resultant(body.unbalanced()),
-    }
+fn acting(body: &BodyBalance) -> Acting {
+    let &BodyBalance { loads, supports, contacts, .. } = body;
+    Acting { loads, supports, contacts, unbalanced: body.unbalanced() }
 }
 
 /// What to tell where a body without hardening does not bear its load.
@@ -272,7 +244,7 @@ fn contact_forces(
     contact: &[ContactState],
 ) -> Vec<[f64; 3]> {
     let Discrete { contacts, pairs, contact_rows, .. } = discrete;
-    let is_slave = |(contact, row): (&scene::Contact, &summary::ContactRow)| {
+    let is_slave = |(contact, row): (&scene::Contact, &ContactRow)| {
         contact.surfaces().next().is_some_and(|first| first.to_string() == row.slave)
     };
     let signs = scene.contact.values().zip(contact_rows).map(|of| if is_slave(of) { 1.0 } else { -1.0 });

@@ -3,7 +3,7 @@
 use crate::comm::threads;
 use crate::fixture::{RANKS, quarters};
 use crate::monitor::timing::Timer;
-use crate::results::summary::Summary;
+use crate::record::summary::Summary;
 use crate::scene::Scene;
 
 const STIFF: f64 = 200.0;
@@ -29,7 +29,7 @@ struct Outcome {
 
 fn solve(scene: &Scene, ranks: usize) -> Outcome {
     let parts = threads::run(ranks, |comm| {
-        let discrete = super::discretise(scene, comm).expect("the scene has a discrete problem");
+        let discrete = crate::model::discrete::discretise(scene, comm).expect("the scene has a discrete problem");
         let solved = super::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("it is held");
         let of = |(s, u): (&crate::decomposition::Subdomain, &Vec<f64>)| {
             s.points.iter().copied().zip(u.as_chunks().0.iter().copied()).collect::<Vec<_>>()

@@ -178,7 +178,7 @@ pub struct Report {
 mod tests {
     use super::*;
     use crate::comm::solo::Solo;
-    use crate::results::summary::State;
+    use crate::record::state::State;
 
     #[test]
     fn names_are_unique_and_select() {

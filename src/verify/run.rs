@@ -7,11 +7,14 @@ use crate::contact::ContactPair;
 use crate::decomposition::Subdomain;
 use crate::element::sample::{Sample, samples};
 use crate::estimate::{self, Estimate, Part};
+use crate::model;
+use crate::model::discrete::Discrete;
 use crate::monitor::table::PhaseTable;
 use crate::monitor::timing::Timer;
-use crate::results::summary::Summary;
+use crate::record::summary::Summary;
 use crate::scene::{Element, Scene};
-use crate::study::{self, Discrete, Solved, StudyError};
+use crate::study;
+use crate::study::{Solved, StudyError};
 use crate::tensor::{Voigt, apply, contract};
 
 /// A solved case.
@@ -42,7 +45,7 @@ impl<'a> Run<'a> {
     /// If the scene has no discrete problem.
     pub fn new(case: &dyn Case, scene: Scene, level: usize, comm: &'a dyn Comm) -> Result<Self, StudyError> {
         let timer = Timer::start();
-        let mut discrete = study::discretise(&scene, comm)?;
+        let mut discrete = model::discretise(&scene, comm)?;
         if let Some(value) = case.force() {
             discrete.loads[0] = Load::Field { body: 0, value, factor: 1.0 };
         }

@@ -14,9 +14,9 @@ use crate::common::msh::Form;
 use crate::common::random::Random;
 use fetiplast::comm::solo::Solo;
 use fetiplast::mesh::gmsh::Msh;
+use fetiplast::model::discrete::discretise;
 use fetiplast::monitor::timing::peak_rss_mb;
 use fetiplast::scene::{Scene, library};
-use fetiplast::study::discretise;
 
 /// Inputs of each kind where no time is stated.
 const FEW: usize = 300;

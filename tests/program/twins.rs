@@ -5,8 +5,9 @@
 
 use crate::common::random::Random;
 use fetiplast::comm::solo::Solo;
+use fetiplast::model::{self, ModelError};
 use fetiplast::monitor::timing::Timer;
-use fetiplast::results::summary::Summary;
+use fetiplast::record::summary::Summary;
 use fetiplast::scene::Scene;
 use fetiplast::study::{self, StudyError};
 
@@ -115,14 +116,15 @@ impl Stacked {
             self.upper.toml("upper", self.lower.height + self.gap),
         );
         let scene = Scene::from_text(&text, "random", 1, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
-        let solved = study::discretise(&scene, &Solo)
+        let solved = model::discretise(&scene, &Solo)
+            .map_err(StudyError::from)
             .and_then(|discrete| study::solve(&scene, &discrete, &Solo, None, &Timer::default(), &mut |_| ()));
         match solved {
             Ok(solved) => {
                 assert_eq!(solved.summary.converged, Some(true), "{self:?} {sides}: {:?}", solved.summary.error);
                 End::Converged(Box::new(solved.summary))
             }
-            Err(StudyError::Unheld(_)) => End::Tips,
+            Err(StudyError::Model(ModelError::Unheld(_))) => End::Tips,
             Err(error) => panic!("{error}\n{text}"),
         }
     }

@@ -7,9 +7,9 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use super::MODES;
-use crate::feti::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
-use crate::feti::ordering::nested_dissection;
+use crate::feti::inverse::kernel::MODES;
+use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
+use crate::sparse::ordering::nested_dissection;
 
 /// A 6x6 block of `G G'`, by `(row, column)` cluster, lower triangle.
 pub type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;

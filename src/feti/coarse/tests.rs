@@ -1,9 +1,9 @@
 use faer::Mat;
 use faer::prelude::Solve;
 
-use super::MODES;
+use super::projector::Projector;
 use crate::constraint::Kind;
-use crate::feti::projector::Projector;
+use crate::feti::inverse::kernel::MODES;
 use crate::fixture::{
     RANKS, Setup, assert_close, built_in, clustered, column, on_ranks, same_on_any_ranks, two_bricks,
     two_bricks_by_metis,

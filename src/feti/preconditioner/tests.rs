@@ -1,20 +1,20 @@
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
-use super::{Preconditioner, boundaries};
+use super::Preconditioner;
+use super::deluxe::Deluxe;
+use super::scaling::Scaling;
 use crate::constraint::Kind;
 use crate::decomposition::Subdomain;
-use crate::feti::cholesky::Precision;
-use crate::feti::deluxe::Deluxe;
-use crate::feti::factor::{Factors, analyse};
-use crate::feti::scaling::Scaling;
-use crate::feti::schur::Schur;
+use crate::feti::inverse::factor::{Factors, analyse};
+use crate::feti::inverse::schur::Schur;
 use crate::fixture::{
     Setup, assert_close, block_diagonal, built_in, column, dense, not_matching, on_ranks, same_on_any_ranks,
     two_bricks, two_bricks_by_metis,
 };
+use crate::model::discrete::Discrete;
 use crate::scene::Scene;
-use crate::study::Discrete;
+use crate::sparse::cholesky::Precision;
 
 /// The upper brick so flat that short edges tie the nodes of each column.
 const FLAT: &str = "body.upper.brick.size.2=0.2";
@@ -38,7 +38,7 @@ impl<'a> Case<'a> {
         let own = stiffnesses.len();
         let whole = analyse(setup.subdomains());
         let mut schur =
-            Schur::new(&whole, boundaries(&setup.gather, own), &vec![1; own], dirichlet.then_some(Precision::Double));
+            Schur::new(&whole, setup.gather.boundaries(), &vec![1; own], dirichlet.then_some(Precision::Double));
         for (k, values) in stiffnesses.iter().enumerate() {
             schur.update(k, k, values, false).expect("the interior is held by its boundary");
         }
@@ -143,7 +143,7 @@ fn lumped_and_dirichlet_equal_their_dense_formulas_with_all_rows_and_with_some()
                 let mut case = Case::new(setup, dirichlet, kept);
                 let stiffness = case.stiffness();
                 let scaled = dense_scaled_rows(&b, &dense_flexibility(setup, &stiffness), kept);
-                let boundary = boundaries(&setup.gather, stiffness.len());
+                let boundary = setup.gather.boundaries();
                 let s = dense_boundary_stiffness(&stiffness, &boundary, dirichlet);
                 let x = setup.multipliers(8);
                 let expected = &scaled * s * scaled.transpose() * column(&x);
@@ -197,7 +197,7 @@ fn deluxe_scaling_is_that_of_the_dense_formula_and_dual_to_the_rows() {
             let mut case = Case::deluxe(setup);
             let (b, stiffness) = (setup.dense_rows(), case.stiffness());
             let scaled = dense_scaled_rows(&b, &dense_flexibility(setup, &stiffness), |_| true);
-            let s = dense_boundary_stiffness(&stiffness, &boundaries(&setup.gather, stiffness.len()), true);
+            let s = dense_boundary_stiffness(&stiffness, &setup.gather.boundaries(), true);
             let x = setup.multipliers(8);
             let deluxe = dense_deluxe(setup, &scaled, &s);
             assert_close(&(&b * (&deluxe * column(&x))), &column(&x), 1e-11);
@@ -242,9 +242,7 @@ fn scaled_rows_are_dual_to_the_rows() {
             scaling.solve(&x, &mut solved);
             let mut torn = setup.gather.zeros();
             setup.gather.add_transpose(1.0, &solved, &mut torn);
-            for ((own, t), boundary) in
-                torn.iter_mut().enumerate().zip(boundaries(&setup.gather, setup.subdomains().len()))
-            {
+            for ((own, t), boundary) in torn.iter_mut().enumerate().zip(setup.gather.boundaries()) {
                 let mut on_boundary: Vec<f64> = boundary.iter().map(|&dof| t[dof as usize]).collect();
                 scaling.flexibility.apply(own, &boundary, &mut on_boundary);
                 boundary.iter().zip(on_boundary).for_each(|(&dof, x)| t[dof as usize] = x);
@@ -286,7 +284,7 @@ fn mending_closes_the_defect_and_leaves_the_interior_without_force() {
                 setup.gather.apply(&u, &mut bu);
                 assert_close(&column(&bu), &column(&wanted), 1e-12);
 
-                let boundaries = boundaries(&setup.gather, u.len());
+                let boundaries = setup.gather.boundaries();
                 for (own, (after, before)) in u.iter().zip(&before).enumerate() {
                     let moved: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
                     let mut forces = vec![0.0; moved.len()];

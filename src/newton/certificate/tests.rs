@@ -1,8 +1,9 @@
 use crate::assembly::stress;
 use crate::comm::threads;
 use crate::fixture::{not_matching, two_bricks, two_meshes};
+use crate::model;
 use crate::monitor::timing::Timer;
-use crate::results::summary::Summary;
+use crate::record::summary::Summary;
 use crate::scene::Scene;
 use crate::study;
 use crate::tensor::Voigt;
@@ -15,7 +16,7 @@ struct Solution {
 
 fn solve(scene: &Scene, ranks: usize) -> Solution {
     let parts = threads::run(ranks, |comm| {
-        let discrete = study::discretise(scene, comm).expect("the scene has a discrete problem");
+        let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
         let solved =
             study::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("the bodies are held");
         let mut stresses = Vec::new();

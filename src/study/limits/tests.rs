@@ -3,7 +3,8 @@
 use crate::comm::threads;
 use crate::fixture::RANKS;
 use crate::monitor::timing::Timer;
-use crate::results::summary::{Extreme, Summary};
+use crate::record::state::Extreme;
+use crate::record::summary::Summary;
 use crate::scene::Scene;
 
 /// What a built-in scene ends with after these changes, the same on any ranks.
@@ -12,7 +13,7 @@ fn solve(name: &str, sets: &[&str]) -> Summary {
     let scene = Scene::load(name, 1, &sets).unwrap();
     let mut found = RANKS.into_iter().map(|ranks| {
         let summaries = threads::run(ranks, |comm| {
-            let discrete = super::super::discretise(&scene, comm).unwrap();
+            let discrete = crate::model::discrete::discretise(&scene, comm).unwrap();
             super::super::solve(&scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).unwrap().summary
         });
         assert!(summaries.iter().all(|s| s.warnings == summaries[0].warnings));
@@ -103,7 +104,7 @@ fn overlaps_are_told_before_anything_is_solved() {
     let told = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
         let scene = Scene::load("patch", 1, &sets).unwrap();
-        threads::run(2, |comm| super::super::discretise(&scene, comm).unwrap().warnings).swap_remove(0)
+        threads::run(2, |comm| crate::model::discrete::discretise(&scene, comm).unwrap().warnings).swap_remove(0)
     };
     assert_eq!(told(&[]), Vec::<String>::new());
     assert_eq!(told(&["body.upper.brick.origin.2=950"]), Vec::<String>::new());

@@ -1,0 +1,319 @@
+//! `K^+`: a generalised inverse of each subdomain's singular stiffness matrix by plain sparse Cholesky.
+//!
+//! With `Q` the orthogonal projector onto the rigid modes restricted to a few well-spread fixing nodes, `K + rho Q` is
+//! positive definite and its inverse is a generalised inverse of `K` (Brzobohaty, Kozubek, Markopoulos, Dostal 2011).
+//! No null pivots are sought. Symbolic analysis is done once and shared by subdomains of equal connectivity.
+
+use std::rc::Rc;
+
+use thiserror::Error;
+
+use super::kernel::RigidModes;
+use super::stock::{Batch, Stock};
+use crate::decomposition::Subdomain;
+use crate::feti::Torn;
+use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, WIDTH, Workspace};
+use crate::sparse::ordering::nested_dissection;
+use crate::sparse::pattern::Pattern;
+
+/// Number of fixing nodes: as many as a box has corners.
+const FIXING_NODES: usize = 4;
+/// Error that a factor in single precision may make.
+const PROBE: f64 = 1e-3;
+
+/// The stiffness matrix lost its definiteness (up to rigid motions).
+#[derive(Debug, Error, PartialEq, Eq)]
+#[error(
+    "subdomain {subdomain}: the stiffness matrix is not positive definite (pivot {pivot} of {dofs}); \
+     check for elements without volume, and for a hardening modulus of zero at the collapse load"
+)]
+pub struct NotDefinite {
+    /// The subdomain.
+    pub subdomain: usize,
+    /// Column where the factorisation broke down, in elimination order.
+    pub pivot: usize,
+    /// Number of unknowns.
+    pub dofs: usize,
+}
+
+/// What subdomains of equal connectivity and shape have in common.
+pub struct Symbolic {
+    /// Sparsity of `K + rho Q`.
+    pub pattern: Pattern,
+    /// Elimination order: the unknown at each place.
+    pub order: Vec<u32>,
+    /// Local fixing nodes.
+    fixing: Vec<u32>,
+    cholesky: Analysis,
+}
+
+impl Symbolic {
+    /// Analyses a subdomain.
+    pub fn new(subdomain: &Subdomain) -> Self {
+        let fixing = fixing_nodes(&subdomain.shape);
+        let pattern = Pattern::new(subdomain.nodes.len(), &subdomain.elements, &fixing);
+        let order = nested_dissection(&pattern.adjacency, 3);
+        let cholesky = Analysis::ordered(Lower::from(&pattern), &order);
+        Self { pattern, order, fixing, cholesky }
+    }
+
+    /// Whether a subdomain may share this analysis.
+    fn fits(&self, subdomain: &Subdomain, of: &Subdomain) -> bool {
+        subdomain.elements == of.elements && fixing_nodes(&subdomain.shape) == self.fixing
+    }
+
+    /// Order and sparsity of the factor.
+    pub fn analysis(&self) -> &Analysis {
+        &self.cholesky
+    }
+}
+
+/// Analyses all subdomains, sharing among those of equal connectivity.
+pub fn analyse(subdomains: &[Subdomain]) -> Vec<Rc<Symbolic>> {
+    let mut kinds: Vec<(usize, Rc<Symbolic>)> = Vec::new();
+    subdomains
+        .iter()
+        .enumerate()
+        .map(|(own, subdomain)| {
+            if let Some((_, shared)) = kinds.iter().find(|(of, kind)| kind.fits(subdomain, &subdomains[*of])) {
+                return Rc::clone(shared);
+            }
+            let new = Rc::new(Symbolic::new(subdomain));
+            kinds.push((own, Rc::clone(&new)));
+            new
+        })
+        .collect()
+}
+
+/// Numeric factors of all own subdomains.
+pub struct Factors {
+    symbolic: Vec<Rc<Symbolic>>,
+    factors: Stock<Factor>,
+    precision: Precision,
+    workspace: Workspace,
+    shifted: Vec<f64>,
+    /// What tells factors apart: equal numbers, equal factors.
+    stamps: Vec<u64>,
+    made: u64,
+    /// Unknowns of each own subdomain that are kept at zero.
+    held: Vec<Vec<u32>>,
+}
+
+impl Factors {
+    /// Space for the factors; nothing is factorised yet. Of single precision are those that pass a probe.
+    pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
+        let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
+        let factors = Stock::new(symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)));
+        let (stamps, held) = (vec![0; symbolic.len()], vec![Vec::new(); symbolic.len()]);
+        Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0, held }
+    }
+
+    /// Symbolic analysis of an own subdomain.
+    pub fn symbolic(&self, own: usize) -> &Rc<Symbolic> {
+        &self.symbolic[own]
+    }
+
+    /// What new factors are stored in at least.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    /// From now on factorises in this precision.
+    pub fn set_precision(&mut self, precision: Precision) {
+        self.precision = precision;
+    }
+
+    /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`; `common` says that it has
+    /// twins, here or on other ranks.
+    ///
+    /// # Errors
+    /// If the matrix is not positive definite, or not finite.
+    pub fn factorise(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        stiffness: &[f64],
+        common: bool,
+    ) -> Result<(), NotDefinite> {
+        self.take(own, subdomain, stiffness, Vec::new(), common)
+    }
+
+    /// As [`Factors::factorise`], with these unknowns kept at zero, which leave no rigid motion: in place of `K + rho Q`, the rest
+    /// of `K`. See [`crate::feti::dual::supported`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn hold(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        stiffness: &[f64],
+        held: &[u32],
+    ) -> Result<(), NotDefinite> {
+        self.take(own, subdomain, stiffness, held.to_vec(), false)
+    }
+
+    /// The least pivot of the factor of an own subdomain, relative to the diagonal entry of its `stiffness` there.
+    pub fn least_pivot(&self, own: usize, stiffness: &[f64]) -> f64 {
+        let Symbolic { pattern, cholesky, .. } = &*self.symbolic[own];
+        cholesky.least_pivot(self.factors.of(own), |dof| stiffness[pattern.column_begin[dof] as usize])
+    }
+
+    /// Unknowns of an own subdomain that are kept at zero, ascending.
+    pub fn held(&self, own: usize) -> &[u32] {
+        &self.held[own]
+    }
+
+    fn take(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        stiffness: &[f64],
+        held: Vec<u32>,
+        common: bool,
+    ) -> Result<(), NotDefinite> {
+        let Symbolic { pattern, fixing, cholesky, .. } = &*self.symbolic[own];
+        let n = pattern.dofs();
+        self.shifted.clear();
+        self.shifted.extend_from_slice(stiffness);
+        let diagonal = pattern.diagonal(stiffness);
+        let rho = diagonal.iter().sum::<f64>() / n as f64;
+        if held.is_empty() {
+            add_fixing(pattern, fixing, &subdomain.shape, rho, &mut self.shifted);
+        } else {
+            pattern.uncouple(&held, &mut self.shifted);
+        }
+        self.held[own] = held;
+        let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
+        if !rho.is_finite() {
+            return Err(refuse(0));
+        }
+        self.made += 1;
+        self.stamps[own] = self.made;
+        let factor = self.factors.renew(own, common, || Factor::new(cholesky, self.precision));
+        if factor.precision() != self.precision {
+            *factor = Factor::new(cholesky, self.precision);
+        }
+        let outcome = self.workspace.factorise(cholesky, Lower::from(pattern), &self.shifted, factor);
+        if factor.precision() == Precision::Double {
+            return outcome.map_err(|breakdown| refuse(breakdown.place));
+        }
+        if outcome.is_err() || !passes_probe(pattern, &self.shifted, |x| self.workspace.solve(cholesky, factor, x)) {
+            *factor = Factor::new(cholesky, Precision::Double);
+            let outcome = self.workspace.factorise(cholesky, Lower::from(pattern), &self.shifted, factor);
+            return outcome.map_err(|breakdown| refuse(breakdown.place));
+        }
+        Ok(())
+    }
+
+    /// From now on an own subdomain has the factor of a congruent one with equal stiffness.
+    pub fn share(&mut self, own: usize, twin: usize) {
+        self.factors.share(own, twin, true);
+        self.held[own].clear();
+        self.stamps[own] = self.stamps[twin];
+    }
+
+    /// A number that is the same as before, or as that of another, as long as the factor is.
+    pub fn stamp(&self, own: usize) -> u64 {
+        self.stamps[own]
+    }
+
+    /// Bytes of factors that one [`Factors::solve`] reads, forward and backward.
+    pub fn bytes_per_solve(&self) -> f64 {
+        self.factors.sum(|factor| 2.0 * factor.bytes() as f64)
+    }
+
+    /// `columns = K^+ columns` for several vectors of an own subdomain, one behind the other.
+    pub fn solve_columns(&mut self, own: usize, columns: &mut [f64]) {
+        let cholesky = &self.symbolic[own].cholesky;
+        let n = self.symbolic[own].pattern.dofs();
+        let mut panel = vec![[0.0; WIDTH]; n];
+        for columns in columns.chunks_mut(WIDTH * n) {
+            panel.fill([0.0; WIDTH]);
+            for (lane, column) in columns.chunks_exact(n).enumerate() {
+                panel.iter_mut().zip(column).for_each(|(panel, x)| panel[lane] = *x);
+            }
+            self.workspace.solve_wide(cholesky, self.factors.of(own), panel.as_flattened_mut());
+            for (lane, column) in columns.chunks_exact_mut(n).enumerate() {
+                column.iter_mut().zip(&panel).for_each(|(x, panel)| *x = panel[lane]);
+            }
+        }
+    }
+
+    /// `x = K^+ x`, subdomain by subdomain.
+    pub fn solve(&mut self, x: &mut Torn) {
+        for batch in self.factors.batches() {
+            match batch {
+                &Batch::Alone(own) => {
+                    self.held[own].iter().for_each(|&dof| x[own][dof as usize] = 0.0);
+                    self.workspace.solve(&self.symbolic[own].cholesky, self.factors.of(own), &mut x[own]);
+                }
+                Batch::Twins(twins) => {
+                    let first = twins[0];
+                    let mut panel = vec![[0.0; WIDTH]; x[first].len()];
+                    for (lane, &own) in twins.iter().enumerate() {
+                        panel.iter_mut().zip(&x[own]).for_each(|(panel, x)| panel[lane] = *x);
+                    }
+                    let cholesky = &self.symbolic[first].cholesky;
+                    self.workspace.solve_wide(cholesky, self.factors.of(first), panel.as_flattened_mut());
+                    for (lane, &own) in twins.iter().enumerate() {
+                        x[own].iter_mut().zip(&panel).for_each(|(x, panel)| *x = panel[lane]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Whether a factor of `A` gives back a vector without a pattern: an error of this size is the rate at which Newton's
+/// method converges with the factor.
+fn passes_probe(pattern: &Pattern, values: &[f64], solve: impl FnOnce(&mut [f64])) -> bool {
+    let probe: Vec<f64> = (0..pattern.dofs()).map(|k| 1.0 + ((k * k + k / 3) % 7) as f64 / 7.0).collect();
+    let mut x = vec![0.0; probe.len()];
+    pattern.multiply_add(values, &probe, &mut x);
+    solve(&mut x);
+    x.iter().zip(&probe).all(|(x, p)| (x - p).abs() <= PROBE * p)
+}
+
+/// Adds `rho Q` of the fixing nodes to the lower values of the stiffness.
+fn add_fixing(pattern: &Pattern, fixing: &[u32], points: &[[f64; 3]], rho: f64, values: &mut [f64]) {
+    let corners: Vec<[f64; 3]> = fixing.iter().map(|&n| points[n as usize]).collect();
+    let modes = RigidModes::new(&corners);
+    let at: Vec<_> = corners.iter().map(|&point| modes.at(point)).collect();
+    for (a, &row) in fixing.iter().enumerate() {
+        for (b, &column) in fixing.iter().enumerate().filter(|&(_, &column)| column <= row) {
+            let block = std::array::from_fn(|i| {
+                std::array::from_fn(|j| rho * (0..6).map(|k| at[a][i][k] * at[b][j][k]).sum::<f64>())
+            });
+            pattern.add_block(values, row, column, &block);
+        }
+    }
+}
+
+/// Well-spread nodes: each the farthest from those before it, the first the farthest from the centroid. Round-off does
+/// not decide: congruent subdomains choose alike.
+fn fixing_nodes(points: &[[f64; 3]]) -> Vec<u32> {
+    let square = |p: [f64; 3], q: [f64; 3]| (0..3).map(|a| (p[a] - q[a]).powi(2)).sum::<f64>();
+    let count = points.len() as f64;
+    let centre: [f64; 3] = std::array::from_fn(|a| points.iter().map(|p| p[a]).sum::<f64>() / count);
+    let mut distance: Vec<f64> = points.iter().map(|&p| square(p, centre)).collect();
+    let mut chosen = Vec::new();
+    while chosen.len() < FIXING_NODES.min(points.len()) {
+        let mut best = 0;
+        for (node, &d) in distance.iter().enumerate() {
+            if d > distance[best] * (1.0 + 1e-9) {
+                best = node;
+            }
+        }
+        if chosen.is_empty() {
+            distance.fill(f64::INFINITY);
+        }
+        chosen.push(best as u32);
+        distance.iter_mut().zip(points).for_each(|(d, &p)| *d = d.min(square(p, points[best])));
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,264 @@
+//! The tangents of own subdomains: which factors they need, and which of these are kept, shared or made again.
+
+use std::rc::Rc;
+use std::sync::Arc;
+
+use super::basis::{Bases, Basis};
+use super::factor::{Factors, NotDefinite};
+use super::schur::Schur;
+use crate::assembly::flow::Flow;
+use crate::assembly::{Region, stiffness};
+use crate::decomposition::Subdomain;
+use crate::feti::Torn;
+use crate::material::Material;
+use crate::monitor::timing::Timer;
+
+/// Change of a tangent's entries, relative to its diagonal, that the preconditioner does not follow. (On the benchmark at
+/// level 2, 0.1 saves a quarter of its factorisations and costs no iteration; 0.3 saves three fifths, and costs a tenth
+/// more iterations.)
+const DRIFT: f64 = 0.1;
+
+/// Least pivot of a tangent's factor, relative to the diagonal entry that it began as, from which the preconditioner follows every
+/// change. (That of slender elastic subdomains is as small, which costs them nothing: they do not change.)
+const SOFT: f64 = 1e-3;
+
+/// What is factorised.
+pub struct Factorising<'s> {
+    /// Factors of whole tangents.
+    pub factors: &'s mut Factors,
+    /// Factors of their interior blocks, for the preconditioner.
+    pub schur: Option<&'s mut Schur>,
+    /// Where the time goes.
+    pub timer: &'s Timer,
+}
+
+/// Tangents as they were factorised.
+pub struct Tangents {
+    /// Congruent subdomains have the same number.
+    twins: Vec<Option<usize>>,
+    /// Lower values of each own subdomain's tangent.
+    values: Vec<Rc<Vec<f64>>>,
+    /// What its factors are of.
+    bases: Vec<Bases>,
+    /// Scratch: a tangent that may be worth factorising.
+    assembled: Vec<f64>,
+}
+
+impl Tangents {
+    /// Of own subdomains without factors; `twins` numbers those that have congruent ones.
+    pub fn new(twins: Vec<Option<usize>>) -> Self {
+        let (values, bases) = (vec![Rc::default(); twins.len()], vec![Bases::default(); twins.len()]);
+        Self { twins, values, bases, assembled: Vec::new() }
+    }
+
+    /// Lower values of each own subdomain's tangent.
+    pub fn values(&self) -> &[Rc<Vec<f64>>] {
+        &self.values
+    }
+
+    /// What the factors of each own subdomain are of.
+    pub fn bases(&self) -> &[Bases] {
+        &self.bases
+    }
+
+    /// Another state is committed now.
+    pub fn commit(&mut self) {
+        self.bases.iter_mut().for_each(Bases::commit);
+    }
+
+    /// All factors are to be made anew.
+    pub fn drop_factors(&mut self) {
+        self.bases.iter_mut().for_each(|bases| bases.factor = None);
+    }
+
+    /// Makes factors again, to the same bits. Local.
+    ///
+    /// # Errors
+    /// The first tangent that is singular; those behind it have no factors then.
+    pub fn remake(&mut self, regions: &[Region], bases: Vec<Bases>, on: &mut Factorising) -> Result<(), NotDefinite> {
+        let mut outcome = Ok(());
+        for (own, bases) in bases.into_iter().enumerate() {
+            if outcome.is_ok() && bases.factor.is_some() {
+                outcome = self.remake_one(regions, own, &bases, on);
+            }
+            self.bases[own] = bases;
+        }
+        outcome
+    }
+
+    fn remake_one(
+        &mut self,
+        regions: &[Region],
+        own: usize,
+        bases: &Bases,
+        on: &mut Factorising,
+    ) -> Result<(), NotDefinite> {
+        let subdomain = regions[own].subdomain;
+        let twin = self.twins[own].is_some();
+        if bases.is_elastic()
+            && let Some(outcome) = self.adopt(own, subdomain.id, on)
+        {
+            outcome?;
+        } else if let Some(basis) = &bases.factor {
+            let common = twin && bases.is_elastic();
+            let values = Rc::new(tangent(&regions[own], own, basis, on.factors));
+            self.values[own] = Rc::clone(&values);
+            on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common))?;
+        }
+        let Some(basis) = &bases.interior else { return Ok(()) };
+        if on.schur.is_none() || self.bases[own].interior.as_ref() == Some(basis) {
+            return Ok(());
+        }
+        let values = if bases.factor.as_ref() == Some(basis) {
+            Rc::clone(&self.values[own])
+        } else {
+            Rc::new(tangent(&regions[own], own, basis, on.factors))
+        };
+        let common = twin && *basis == Basis::Elastic;
+        self.take_interior(own, subdomain.id, &values, basis.clone(), common, on)
+    }
+
+    /// Assembles the tangents at `u`, where so many elements of each own subdomain are `yielding`, with its directions of `flows`, and factorises those that changed by more than `left`.
+    /// Returns for each own subdomain how many were (1 or 0; shared ones count), and the first that is singular; those
+    /// behind it have not been looked at then. Local.
+    pub fn update(
+        &mut self,
+        regions: &[Region],
+        (u, yielding, flows): (&Torn, &[usize], &[Flow]),
+        left: f64,
+        on: &mut Factorising,
+    ) -> (Vec<f64>, Option<NotDefinite>) {
+        let mut failure: Option<NotDefinite> = None;
+        let mut factorised = Vec::with_capacity(u.len());
+        for (own, &Region { subdomain, material, history }) in regions.iter().enumerate() {
+            // An elastic tangent that was elastic before is the same matrix.
+            let unchanged = self.bases[own].is_elastic() && yielding[own] == 0;
+            if unchanged || failure.is_some() {
+                factorised.push(0.0);
+                continue;
+            }
+            let elastic = yielding[own] == 0;
+            if elastic && let Some(outcome) = self.adopt(own, subdomain.id, on) {
+                factorised.push(1.0);
+                failure = outcome.err();
+                continue;
+            }
+            let pattern = &on.factors.symbolic(own).pattern;
+            self.assembled.resize(pattern.rows.len(), 0.0);
+            let (assembled, at) = (&mut self.assembled, (&u[own][..], &flows[own][..]));
+            on.timer.time("assembly", || stiffness::assemble(subdomain, material, history, at, pattern, assembled));
+            let known = self.bases[own].factor.is_some();
+            let change = if known { pattern.difference(&self.values[own], assembled) } else { f64::INFINITY };
+            // Where twins are elastic on other ranks only, it gets what it would get from one of them here.
+            let common = elastic && self.twins[own].is_some();
+            if change <= left && !common {
+                factorised.push(0.0);
+                continue;
+            }
+            factorised.push(1.0);
+            let basis =
+                if elastic { Basis::Elastic } else { Basis::At(Arc::new(u[own].clone()), Flow::clone(&flows[own])) };
+            self.bases[own].drift += change;
+            self.bases[own].factor = Some(basis.clone());
+            let values = Rc::new(assembled.clone());
+            self.values[own] = Rc::clone(&values);
+            let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common));
+            on.timer.count("factorisation", on.factors.symbolic(own).analysis().flops(), 0.0);
+            // Of what has become soft little shows in the entries, which may be those of the volume.
+            let drift = self.bases[own].drift;
+            let is_stale = || drift.is_nan() || drift > DRIFT || on.factors.least_pivot(own, &values) < SOFT;
+            failure = match outcome {
+                Ok(()) if common || is_stale() => {
+                    self.take_interior(own, subdomain.id, &values, basis, common, on).err()
+                }
+                outcome => outcome.err(),
+            };
+        }
+        (factorised, failure)
+    }
+
+    /// Gives the preconditioner the interior block of an own subdomain's tangent as it was factorised last, however little that
+    /// has changed. Local.
+    ///
+    /// # Errors
+    /// If it is singular.
+    pub fn follow(&mut self, own: usize, id: usize, on: &mut Factorising) -> Result<(), NotDefinite> {
+        let Bases { factor, interior, .. } = &self.bases[own];
+        let Some(basis) = factor.clone().filter(|_| interior != factor) else { return Ok(()) };
+        let common = self.twins[own].is_some() && basis == Basis::Elastic;
+        let values = Rc::clone(&self.values[own]);
+        self.take_interior(own, id, &values, basis, common, on)
+    }
+
+    /// Keeps unknowns of an own subdomain at zero from now on, none if `held` is empty, in the factor of its tangent as it was
+    /// factorised last. Local.
+    ///
+    /// # Errors
+    /// If it is singular.
+    pub fn hold(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        held: &[u32],
+        on: &mut Factorising,
+    ) -> Result<(), NotDefinite> {
+        if on.factors.held(own) == held {
+            return Ok(());
+        }
+        let values = &self.values[own];
+        on.timer.time("factorisation", || match held {
+            [] => on.factors.factorise(own, subdomain, values, false),
+            held => on.factors.hold(own, subdomain, values, held),
+        })
+    }
+
+    /// Gives an elastic subdomain what an elastic twin has already; `None` if there is none.
+    fn adopt(&mut self, own: usize, id: usize, on: &mut Factorising) -> Option<Result<(), NotDefinite>> {
+        let class = self.twins[own]?;
+        let elastic = |k: &usize| self.twins[*k] == Some(class) && self.bases[*k].is_elastic();
+        let mut twins = (0..self.twins.len()).filter(elastic);
+        let twin = twins.clone().next()?;
+        let alike = on.schur.as_ref().and_then(|schur| twins.find(|&k| schur.alike(own, k)));
+        on.factors.share(own, twin);
+        self.values[own] = Rc::clone(&self.values[twin]);
+        self.bases[own].factor = Some(Basis::Elastic);
+        if let (Some(alike), Some(schur)) = (alike, &mut on.schur) {
+            (self.bases[own].interior, self.bases[own].drift) = (Some(Basis::Elastic), 0.0);
+            schur.share(own, alike);
+            return Some(Ok(()));
+        }
+        let values = Rc::clone(&self.values[own]);
+        Some(self.take_interior(own, id, &values, Basis::Elastic, true, on))
+    }
+
+    /// Gives the preconditioner the interior block of these lower values, if there is one.
+    fn take_interior(
+        &mut self,
+        own: usize,
+        id: usize,
+        values: &[f64],
+        basis: Basis,
+        common: bool,
+        on: &mut Factorising,
+    ) -> Result<(), NotDefinite> {
+        let Some(schur) = &mut on.schur else { return Ok(()) };
+        (self.bases[own].interior, self.bases[own].drift) = (Some(basis), 0.0);
+        on.timer.count("factorisation of the interior", schur.flops(own), 0.0);
+        on.timer.time("factorisation of the interior", || schur.update(own, id, values, common))
+    }
+}
+
+/// Lower values of the tangent that a factor is of.
+fn tangent(region: &Region, own: usize, basis: &Basis, factors: &Factors) -> Vec<f64> {
+    let &Region { subdomain, material, history } = region;
+    let pattern = &factors.symbolic(own).pattern;
+    let mut values = vec![0.0; pattern.rows.len()];
+    match basis {
+        Basis::Elastic => {
+            let (material, rest) = (Material { yield_stress: None, ..*material }, vec![0.0; subdomain.dofs()]);
+            stiffness::assemble(subdomain, &material, &[], (&rest, &[]), pattern, &mut values)
+        }
+        Basis::At(u, flow) => stiffness::assemble(subdomain, material, history, (u, flow), pattern, &mut values),
+    };
+    values
+}

@@ -1,0 +1,40 @@
+//! From a scene to its discrete problem: meshes, subdomains, contact conditions, rows of B and loads.
+//!
+//! [`bodies`] reads and makes the meshes, [`contacts`] pairs the surfaces, [`conditions`] has the rows and what changes over the load
+//! history, [`extent`] measures bodies and places,
+//! [`discrete`] joins all to the problem of one rank. [`held`] tells whether anything moves freely.
+
+pub mod bodies;
+pub mod conditions;
+pub mod contacts;
+pub mod discrete;
+pub mod extent;
+pub mod held;
+
+pub use discrete::{Discrete, discretise, discretise_expecting};
+
+use thiserror::Error;
+
+use self::bodies::MeshError;
+use crate::contact::ContactError;
+use crate::feti::coarse::Floating;
+
+/// Why a scene has no discrete problem; the same on every rank.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// A mesh file is missing or bad.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A contact has no conditions, or impossible ones.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
+    /// Supports contradict each other.
+    #[error("{0}")]
+    Supports(String),
+    /// Supports, contacts and loads together do not hold a body.
+    #[error("{0}")]
+    Unheld(String),
+    /// Some body can move freely.
+    #[error(transparent)]
+    Floating(#[from] Floating),
+}

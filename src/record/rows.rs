@@ -1,0 +1,73 @@
+//! Rows of tables: one an increment, a Newton step, or a level of a cascade.
+
+use serde::{Deserialize, Serialize};
+
+use super::state::State;
+
+/// The end of an increment.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepRow {
+    /// Number of the load step, from 1.
+    pub step: u64,
+    /// Its name.
+    pub name: String,
+    /// Number of the increment in the step, from 1.
+    pub increment: u64,
+    /// Load steps done, that of the present one as a fraction: the time in the result file.
+    pub time: f64,
+    /// How often parts of the increment were halved because Newton's method failed.
+    pub halvings: u64,
+    /// Whether the increment was reached.
+    pub converged: bool,
+    /// The state there.
+    #[serde(flatten)]
+    pub state: State,
+}
+
+/// One Newton step.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct NewtonRow {
+    /// Number of the increment of the load, from 1.
+    pub increment: u64,
+    /// Number, from 1.
+    pub step: u64,
+    /// The paper's stopping criterion in the energy norm.
+    pub criterion: f64,
+    /// Relative residual of the equilibrium.
+    pub residual: f64,
+    /// Length of the step taken, 1 is Newton's own.
+    pub damping: f64,
+    /// Elements with plastic flow.
+    pub plastic_elements: u64,
+    /// Contact pairs that transmit pressure.
+    pub active_contacts: u64,
+    /// `J` after the step.
+    pub energy: f64,
+    /// Residual of the subdomains' stiffness problems, relative to their forces: what rounding costs.
+    pub local_residual: f64,
+    /// Outer iterations of the QP solver: multiplier updates of SMALSE-M, sets of the active-set method.
+    pub qp_iterations: u64,
+    /// Applications of F.
+    pub hessian_multiplications: u64,
+    /// Subdomains that got a new factor.
+    pub factorisations: u64,
+    /// Wall time.
+    pub seconds: f64,
+}
+
+/// What the solution on a coarser level took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CascadeRow {
+    /// Refinement level.
+    pub level: usize,
+    /// Subdomains.
+    pub subdomains: u64,
+    /// Newton steps.
+    pub newton_iterations: Option<u64>,
+    /// Every application of F.
+    pub hessian_multiplications: Option<u64>,
+    /// Subdomains that got a new factor; congruent ones that share it count each.
+    pub factorisations: Option<u64>,
+    /// Wall time in seconds.
+    pub seconds: f64,
+}

@@ -1,0 +1,24 @@
+//! Going on from what an earlier run left: a checkpoint of the same run, or the state at the end of a result file.
+//!
+//! [`checkpoint`] turns what a run stands on into arrays and back, on any number of ranks; [`state`] does so for the material's
+//! history and the displacement alone. [`places`] finds integration points again by where they are, [`meshes`] tells whether
+//! meshes are the same.
+
+pub mod checkpoint;
+pub mod meshes;
+pub mod places;
+pub mod state;
+
+use crate::newton::loading;
+use crate::record::rows::StepRow;
+use crate::results::piece::Piece;
+
+/// Where the solution of a scene stands between two Newton steps: all that the rest of it depends on.
+pub struct Standing {
+    /// In the load history.
+    pub halt: loading::Halt,
+    /// The increments reached so far.
+    pub rows: Vec<StepRow>,
+    /// Their fields; no mesh.
+    pub recorded: Piece,
+}

@@ -1,0 +1,193 @@
+//! How large a scene is, from counts: nothing is built that grows with its meshes.
+//!
+//! Exact are cells, elements and nodes of structured bodies, rows of supports, and what comes of cutting bricks into boxes:
+//! a box of `c` cells has `(d c_x + 1) (d c_y + 1) (d c_z + 1)` nodes with elements of degree `d`, a node with `m` copies
+//! `3 (m - 1)` gluing rows, so all of them are as many as the unknowns of all boxes are more than those of the bodies. What METIS
+//! makes of a body is estimated as if it were cut into about as many boxes, as near to cubes as the body lets them;
+//! [`Sizes::estimated`] names what is. Rows of contact are counted by [`contacts`].
+
+pub mod contacts;
+mod local;
+mod parts;
+mod structured;
+#[cfg(test)]
+mod tests;
+
+use self::parts::Parts;
+use self::structured::Structured;
+use super::memory::{self, Lengths, Memory, SLOT, megabytes};
+use crate::decomposition::{BodyMesh, Cut, bricks, cost, tetrahedra};
+use crate::element::Kind;
+use crate::model::bodies;
+use crate::model::bodies::MeshError;
+use crate::model::discrete::{can_be_cut, cut};
+use crate::record::counts::Sizes;
+use crate::scene::{Axis, Body, Contact, Scene, SurfaceName};
+
+/// A scene's bodies, counted.
+pub struct Counted<'a> {
+    scene: &'a Scene,
+    bodies: Vec<BodyMesh>,
+    shapes: Vec<Structured<'a>>,
+    cut: Cut,
+}
+
+/// What METIS and the graph that it cuts take for each element, in bytes.
+const CUTTING: f64 = 250.0;
+
+/// What is estimated where METIS cuts.
+const BY_METIS: [&str; 6] = ["subdomains", "clusters", "contact_subdomains", "primal_dofs", "gluing_rows", "dual_dofs"];
+
+impl<'a> Counted<'a> {
+    /// Counts the bodies of a scene; `None` if there are meshes from files.
+    pub fn new(scene: &'a Scene) -> Option<Self> {
+        let shapes = scene.body.values().map(Structured::new).collect::<Option<Vec<_>>>()?;
+        let bodies = bodies::of_counts(scene, shapes.iter().map(Structured::counts));
+        Some(Self::of_shapes(scene, bodies, shapes))
+    }
+
+    /// The same for meshes from files, once they are read; `None` if there are none.
+    pub fn of_read(scene: &'a Scene, bodies: &[BodyMesh]) -> Option<Self> {
+        let shape = |(body, mesh): (&'a Body, &BodyMesh)| {
+            Structured::new(body).unwrap_or_else(|| Structured::of_mesh(body, mesh.counts()))
+        };
+        let shapes = scene.body.values().zip(bodies).map(shape).collect();
+        scene.body.values().any(|body| body.gmsh().is_some()).then(|| Self::of_shapes(scene, bodies.to_vec(), shapes))
+    }
+
+    fn of_shapes(scene: &'a Scene, bodies: Vec<BodyMesh>, shapes: Vec<Structured<'a>>) -> Self {
+        let cut = cut(&scene.decomposition.method, &bodies);
+        Self { scene, bodies, shapes, cut }
+    }
+
+    /// As many linear tetrahedra as would take the work of the scene's elements.
+    pub fn tetrahedra(&self) -> u64 {
+        tetrahedra(&self.bodies)
+    }
+
+    /// Refuses what cannot be cut.
+    ///
+    /// # Errors
+    /// If there is more than METIS can count.
+    pub fn can_be_cut(&self) -> Result<(), MeshError> {
+        can_be_cut(self.scene, &self.bodies, self.cut)
+    }
+
+    /// All sizes but those of contact.
+    pub fn sizes(&self) -> Sizes {
+        let mut sizes = Sizes::default();
+        for (body, parts) in self.bodies.iter().zip(self.parts()) {
+            let counts = body.counts();
+            for (sum, part) in [
+                (&mut sizes.nodes, counts.nodes),
+                (&mut sizes.cells, counts.cells),
+                (&mut sizes.elements, counts.elements),
+                (&mut sizes.subdomains, parts.count),
+                (&mut sizes.clusters, parts.clusters),
+                (&mut sizes.contact_subdomains, parts.touching),
+                (&mut sizes.primal_dofs, parts.unknowns),
+                (&mut sizes.gluing_rows, parts.unknowns - 3 * counts.nodes),
+            ] {
+                *sum = sum.saturating_add(part);
+            }
+        }
+        sizes.dirichlet_rows = self.supported();
+        sizes.dual_dofs = sizes.gluing_rows.saturating_add(sizes.dirichlet_rows);
+        if let Cut::Metis(_) = self.cut {
+            sizes.estimated = BY_METIS.map(String::from).to_vec();
+        }
+        sizes
+    }
+
+    /// What solving takes.
+    pub fn memory(&self) -> Memory {
+        let (mut numbers, mut slots, mut subdomains, mut clusters, mut largest) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
+        for parts in self.parts() {
+            numbers += parts.numbers;
+            slots += parts.slots;
+            subdomains += parts.count as f64;
+            clusters += parts.clusters as f64;
+            largest = largest.max(parts.factor);
+        }
+        let conditions = self.conditions();
+        // Of nodes with one copy for the most part, on both sides.
+        slots += self.supported() as f64 + 3.0 * conditions;
+        let is_cut_at_once = |body: &&BodyMesh| matches!(self.cut, Cut::Metis(_)) || body.brick().is_none();
+        let elements = self.bodies.iter().filter(is_cut_at_once).map(|body| body.counts().elements as f64);
+        Memory {
+            subdomains_mb: megabytes(8.0 * (numbers + SLOT * slots)),
+            rank_mb: memory::of_rank_mb(subdomains, clusters, conditions, largest),
+            cutting_mb: megabytes(CUTTING * elements.sum::<f64>()),
+        }
+    }
+
+    /// Rows of all supports.
+    fn supported(&self) -> u64 {
+        let on = |(name, shape): (&String, &Structured)| -> u64 {
+            let fixed = |axis: &Axis| {
+                let of_body = self.scene.support.values().filter(|s| s.surface.body == *name && s.fix.contains(axis));
+                shape.on(&of_body.map(|s| &s.surface.surface[..]).collect::<Vec<_>>())
+            };
+            Axis::ALL.iter().map(fixed).sum()
+        };
+        self.scene.body.keys().zip(&self.shapes).map(on).fold(0, u64::saturating_add)
+    }
+
+    /// Most conditions that contacts can have.
+    fn conditions(&self) -> f64 {
+        let slaves = self.scene.contact.values().filter_map(|contact| contact.surfaces().next());
+        slaves.map(|slave| self.nodes_on(slave) as f64).sum()
+    }
+
+    /// Nodes of a surface.
+    pub fn nodes_on(&self, surface: &SurfaceName) -> u64 {
+        let body = self.scene.body.keys().position(|name| *name == surface.body);
+        body.map_or(0, |body| self.shapes[body].on(&[&surface.surface]))
+    }
+
+    /// Surfaces of a body that are in contact.
+    fn touching(&self, body: &str) -> Vec<&str> {
+        let surfaces = self.scene.contact.values().flat_map(Contact::surfaces);
+        surfaces.filter(|surface| surface.body == body).map(|surface| &surface.surface[..]).collect()
+    }
+
+    /// The parts of each body.
+    fn parts(&self) -> Vec<Parts> {
+        let all = self.tetrahedra();
+        let bodies = || self.scene.body.keys().zip(&self.bodies).zip(&self.shapes);
+        let cluster = |subdomains: usize| match self.scene.decomposition.cluster {
+            Some(cluster) => cluster,
+            None => cost::cluster(subdomains, all),
+        };
+        match self.cut {
+            Cut::Bricks(cells) => {
+                let count = self.bodies.iter().map(|body| bricks::count(body, cells)).fold(0, usize::saturating_add);
+                let cluster = cluster(count);
+                // Boxes of one kind of elements are alike.
+                let mut known: Vec<(Kind, Lengths)> = Vec::new();
+                let mut lengths = |kind: Kind| match known.iter().find(|(of, _)| *of == kind) {
+                    Some((_, lengths)) => *lengths,
+                    None => {
+                        known.push((kind, local::of_box(kind, cells)));
+                        known[known.len() - 1].1
+                    }
+                };
+                let of = |((name, body), shape): ((&String, &BodyMesh), &Structured)| {
+                    let touching = shape.boxes_on(cells, &self.touching(name));
+                    Parts::boxes(self.scene, body, (cells, lengths(body.kind)), cluster, touching)
+                };
+                bodies().map(of).collect()
+            }
+            Cut::Metis(parts) => {
+                let cluster = cluster(parts) as f64;
+                let of = |((name, body), shape): ((&String, &BodyMesh), &Structured)| {
+                    let share = tetrahedra(std::slice::from_ref(body)) as f64 / all as f64;
+                    let parts = (parts as f64 * share).max(1.0);
+                    let touching = shape.on(&self.touching(name));
+                    Parts::pieces(self.scene, body, shape.extent(), [parts, cluster], touching as f64)
+                };
+                bodies().map(of).collect()
+            }
+        }
+    }
+}

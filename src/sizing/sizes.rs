@@ -1,0 +1,73 @@
+//! How large a discrete problem is: counts in the paper's way, and the memory that solving would take.
+
+use std::rc::Rc;
+
+use super::memory::{self, Lengths, Memory, PROCESS_MB, SLOT};
+use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use crate::constraint::Kind;
+use crate::decomposition::Cut;
+use crate::feti::dual::space::RowSpace;
+use crate::feti::inverse::factor::{Symbolic, analyse};
+use crate::feti::inverse::hybrid;
+use crate::model::discrete::{Discrete, cut};
+use crate::record::counts::Sizes;
+use crate::scene::Scene;
+
+/// Counts what a discrete problem consists of, in the paper's way. Collective.
+pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
+    let Discrete { decomposition, constraints, bodies, .. } = discrete;
+    let space = RowSpace::new(comm, &decomposition.shares, constraints);
+    let mut partial = Vec::new();
+    for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
+        let touches = subdomain.facets.iter().any(|facet| discrete.touching.contains(&facet.surface));
+        let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0, f64::from(touches)];
+        for &row in rows {
+            counts[match constraints.rows[row as usize].kind {
+                Kind::Gluing => 1,
+                Kind::Support { .. } => 2,
+                Kind::Contact { .. } => 3,
+            }] += 1.0;
+        }
+        partial.extend(counts);
+    }
+    let sum: Vec<u64> = space.sum(&partial, 5).into_iter().map(|n| n as u64).collect();
+    Sizes {
+        nodes: bodies.iter().map(|b| b.counts().nodes).sum(),
+        cells: bodies.iter().map(|b| b.counts().cells).sum(),
+        elements: bodies.iter().map(|b| b.counts().elements).sum(),
+        subdomains: decomposition.shares.total() as u64,
+        clusters: decomposition.clusters.total() as u64,
+        contact_subdomains: sum[4],
+        primal_dofs: sum[0],
+        gluing_rows: sum[1],
+        dirichlet_rows: sum[2],
+        contact_rows: sum[3],
+        dual_dofs: sum[1] + sum[2] + sum[3],
+        estimated: Vec::new(),
+    }
+}
+
+/// Memory that solving would take: as the model of [`mod@super::memory`] has it, from the analysis of all subdomains.
+/// Subdomains of equal connectivity are analysed once. Collective.
+pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
+    let Discrete { decomposition, constraints, pairs, .. } = discrete;
+    let is_box = matches!(cut(&scene.decomposition.method, &discrete.bodies), Cut::Bricks(_));
+    let lengths = |s: &Rc<Symbolic>| {
+        let lengths = [s.analysis().factor_length(), s.pattern.rows.len(), s.pattern.dofs()];
+        let [factor, matrix, unknowns] = lengths.map(|n| n as f64);
+        Lengths { factor, matrix, unknowns }
+    };
+    let lengths: Vec<Lengths> = analyse(&decomposition.subdomains).iter().map(lengths).collect();
+    let numbers: f64 = lengths.iter().map(|&lengths| memory::of_subdomain(scene, lengths, is_box)).sum();
+    let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
+    let clusters = decomposition.clusters.of_rank(comm.rank()).filter(|members| members.len() > 1);
+    let bonds: f64 = clusters.map(|members| hybrid::numbers(&decomposition.subdomains[members]) as f64).sum();
+    let slots = SLOT * constraints.slot_subdomain.len() as f64;
+    let mine = memory::megabytes(8.0 * (numbers + bonds + slots));
+    let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
+    Memory {
+        subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0],
+        rank_mb: memory::of_rank_mb(subdomains, clusters, pairs.len() as f64, largest),
+        cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)),
+    }
+}

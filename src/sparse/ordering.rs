@@ -1,0 +1,41 @@
+//! Fill-reducing ordering by METIS nested dissection of a graph whose nodes have some unknowns each.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use crate::heap::exhausted;
+
+/// The unknown at each place of the elimination, from the adjacency of the nodes with `width` unknowns each.
+///
+/// # Panics
+/// If METIS refuses the graph: a bug, since the adjacency is symmetric and free of loops.
+pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>), width: u32) -> Vec<u32> {
+    let (begins, neighbours) = adjacency;
+    let nodes = begins.len() - 1;
+    let mut count = nodes as metis_sys::idx_t;
+    let (mut forward, mut inverse) = (vec![0; nodes], vec![0; nodes]);
+    let _alone = alone();
+    // Safety: METIS reads the graph and writes `count` entries to each permutation; pointers and lengths agree.
+    let status = unsafe {
+        metis_sys::METIS_NodeND(
+            &mut count,
+            begins.as_ptr().cast_mut(),
+            neighbours.as_ptr().cast_mut(),
+            std::ptr::null_mut(),
+            std::ptr::null_mut(),
+            forward.as_mut_ptr(),
+            inverse.as_mut_ptr(),
+        )
+    };
+    if status == metis_sys::rstatus_et_METIS_ERROR_MEMORY {
+        exhausted(size_of_val(neighbours));
+    }
+    assert_eq!(status, metis_sys::rstatus_et_METIS_OK, "METIS orders a valid graph");
+    forward.iter().flat_map(|&n| (0..width).map(move |a| width * n as u32 + a)).collect()
+}
+
+/// Lets one thread at a time into METIS, which draws from the C library's one generator: without it, results would depend
+/// on what other threads do.
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
+    static LOCK: Mutex<()> = Mutex::new(());
+    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,162 @@
+//! Contact at the nodes of the mesh: pressure on both sides, gap and status on the slave's.
+//!
+//! The pressure of a condition is its force over its area. A node of the master surface has the mean of the conditions around the
+//! place opposite, weighted by the slave's linear functions there. A node of several contacts, or of several smooth parts of one,
+//! shows the largest of its pressures and the smallest of its gaps; where contacts share nodes each has a field of its own beside
+//! these. Nodes beyond the edge of the other surface touch nothing, and show nothing.
+
+use std::collections::BTreeMap;
+
+use crate::contact::{ContactPair, MasterNode};
+use crate::decomposition::Subdomain;
+use crate::results::piece::Field;
+
+/// Contact at one pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactState {
+    /// Index of the pair.
+    pub pair: usize,
+    /// Normal force that the surfaces exert on each other, at least zero (force).
+    pub force: f64,
+    /// Distance along the normal (length); negative is penetration.
+    pub gap: f64,
+}
+
+/// All contacts of a scene.
+#[derive(Clone, Copy)]
+pub struct Touching<'a> {
+    /// Their names.
+    pub names: &'a [String],
+    /// Their conditions.
+    pub pairs: &'a [ContactPair],
+    /// Their master nodes.
+    pub masters: &'a [MasterNode],
+}
+
+/// Contact at the nodes of a rank's subdomains.
+struct AtNodes {
+    /// Zero where nothing touches.
+    pressure: Vec<f64>,
+    /// Not a number off the slave surfaces.
+    gap: Vec<f64>,
+    /// 1 where a contact is closed, 0 where none is, -1 off the slave surfaces.
+    status: Vec<i64>,
+}
+
+/// Fields of the nodes of these subdomains, one behind the other; `states` are those of the pairs whose rows are on this rank.
+pub fn fields(subdomains: &[Subdomain], touching: Touching, states: &[ContactState]) -> Vec<Field> {
+    let known = Known::new(touching, states);
+    let of = |wanted: &dyn Fn(usize) -> bool| {
+        let parts = subdomains.iter().map(|subdomain| known.at_nodes(subdomain, wanted));
+        parts.fold(AtNodes::nothing(0), AtNodes::and)
+    };
+    let AtNodes { pressure, gap, status } = of(&|_| true);
+    let mut fields = vec![
+        Field::scalar("contact_pressure", pressure),
+        Field::scalar("contact_gap", gap),
+        Field::integer("contact_status", status),
+    ];
+    for contact in sharing(touching) {
+        let pressure = of(&|pair| touching.pairs[pair].contact == contact).pressure;
+        // Names in HDF5 have no slash.
+        let name = touching.names[contact].replace('/', "_");
+        fields.push(Field::scalar(&format!("contact_pressure_{name}"), pressure));
+    }
+    fields
+}
+
+/// Contacts that have a node in common with another one.
+fn sharing(Touching { names, pairs, masters }: Touching) -> Vec<usize> {
+    let slaves = pairs.iter().filter(|pair| pair.covered).map(|pair| (pair.slave, pair.contact));
+    let masters = masters.iter().map(|node| (node.node, pairs[node.pairs[0].0].contact));
+    let mut of_node: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+    slaves.chain(masters).for_each(|(node, contact)| of_node.entry(node).or_default().push(contact));
+    let mut shares = vec![false; names.len()];
+    for contacts in of_node.values().filter(|contacts| contacts.iter().any(|contact| *contact != contacts[0])) {
+        contacts.iter().for_each(|contact| shares[*contact] = true);
+    }
+    (0..shares.len()).filter(|contact| shares[*contact]).collect()
+}
+
+/// What a rank knows of contact, by node.
+struct Known<'a> {
+    /// All nodes of both sides, ascending.
+    nodes: Vec<u64>,
+    /// Nodes of slave surfaces with the states of their conditions, ascending.
+    slaves: Vec<(u64, &'a ContactState)>,
+    /// Nodes of master surfaces, ascending.
+    masters: Vec<&'a MasterNode>,
+    /// Pressure of each condition; zero where its row is on other ranks.
+    pressures: Vec<f64>,
+}
+
+impl<'a> Known<'a> {
+    fn new(Touching { pairs, masters, .. }: Touching<'a>, states: &'a [ContactState]) -> Self {
+        let mut pressures = vec![0.0; pairs.len()];
+        states.iter().for_each(|state| pressures[state.pair] = state.force / pairs[state.pair].area);
+        let covered = states.iter().filter(|state| pairs[state.pair].covered);
+        let mut slaves: Vec<_> = covered.map(|state| (pairs[state.pair].slave, state)).collect();
+        slaves.sort_by_key(|(node, state)| (*node, state.pair));
+        let mut masters: Vec<&MasterNode> = masters.iter().collect();
+        masters.sort_by_key(|master| master.node);
+        let nodes = slaves.iter().map(|(node, _)| *node).chain(masters.iter().map(|master| master.node));
+        let mut nodes: Vec<u64> = nodes.collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        Self { nodes, slaves, masters, pressures }
+    }
+
+    /// Contact at the nodes of a subdomain, of the conditions that are wanted.
+    fn at_nodes(&self, subdomain: &Subdomain, wanted: &dyn Fn(usize) -> bool) -> AtNodes {
+        let mut found = AtNodes::nothing(subdomain.nodes.len());
+        // Copies of a node show the same, also where a subdomain has no face of the surface.
+        let touches = |(_, node): &(usize, &u64)| self.nodes.binary_search(node).is_ok();
+        for (local, &node) in subdomain.nodes.iter().enumerate().filter(touches) {
+            let slaves = &self.slaves[self.slaves.partition_point(|(known, _)| *known < node)..];
+            let slaves = slaves.iter().take_while(|(known, _)| *known == node).map(|(_, state)| state);
+            for state in slaves.filter(|state| wanted(state.pair)) {
+                found.pressure[local] = found.pressure[local].max(self.pressures[state.pair]);
+                // `min` takes the number of a number and none.
+                found.gap[local] = state.gap.min(found.gap[local]);
+                found.status[local] = found.status[local].max(i64::from(state.force > 0.0));
+            }
+            let masters = &self.masters[self.masters.partition_point(|master| master.node < node)..];
+            let masters = masters.iter().take_while(|master| master.node == node);
+            for master in masters.filter(|master| wanted(master.pairs[0].0)) {
+                let mean = master.pairs.iter().map(|&(pair, weight)| weight * self.pressures[pair]).sum();
+                found.pressure[local] = found.pressure[local].max(mean);
+            }
+        }
+        found.fill_middles(subdomain);
+        found
+    }
+}
+
+impl AtNodes {
+    /// Nodes off all surfaces.
+    fn nothing(nodes: usize) -> Self {
+        Self { pressure: vec![0.0; nodes], gap: vec![f64::NAN; nodes], status: vec![-1; nodes] }
+    }
+
+    /// One behind the other.
+    fn and(mut self, other: Self) -> Self {
+        self.pressure.extend(other.pressure);
+        self.gap.extend(other.gap);
+        self.status.extend(other.status);
+        self
+    }
+
+    /// Where contact of a quadratic face has conditions at its corners only, its fields are linear: middles have the means.
+    fn fill_middles(&mut self, subdomain: &Subdomain) {
+        let quadratic = subdomain.facets.iter().filter(|facet| facet.nodes.len() == 6);
+        let edges =
+            quadratic.flat_map(|facet| (0..3).map(|k| [3 + k, k, (k + 1) % 3].map(|n| facet.nodes[n] as usize)));
+        for [middle, a, b] in edges {
+            if self.status[middle] < 0 && self.status[a] >= 0 && self.status[b] >= 0 {
+                self.pressure[middle] = 0.5 * (self.pressure[a] + self.pressure[b]);
+                self.gap[middle] = 0.5 * (self.gap[a] + self.gap[b]);
+                self.status[middle] = self.status[a].max(self.status[b]);
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! The solution as fields on one rank's mesh: what ParaView shows.
+
+use super::contact::{self, ContactState, Touching};
+use crate::assembly::internal;
+use crate::decomposition::Subdomain;
+use crate::element::Kind;
+use crate::feti::Torn;
+use crate::newton::{Solution, TornProblem};
+use crate::results::piece::{Field, Piece};
+
+/// VTK's number of a kind of cell.
+fn vtk_type(kind: Kind) -> u8 {
+    match kind {
+        Kind::Tet4 => 10,
+        Kind::Tet10 => 24,
+        Kind::Hex8 => 12,
+    }
+}
+
+/// Mesh of a rank's subdomains, one behind the other, with the fields that never change.
+pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
+    let mut piece = Piece { offsets: vec![0], ..Piece::default() };
+    let (mut subdomain_ids, mut bodies, mut materials, mut nodes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for subdomain in subdomains {
+        nodes.extend(subdomain.nodes.iter().map(|&node| node as i64));
+        let first = piece.points.len() as u64;
+        piece.points.extend(&subdomain.points);
+        for of_element in &subdomain.elements {
+            piece.connectivity.extend(of_element.iter().map(|&n| first + u64::from(n)));
+            piece.offsets.push(piece.connectivity.len() as u64);
+            piece.types.push(vtk_type(subdomain.elements.kind()));
+            subdomain_ids.push(subdomain.id as i64);
+            bodies.push(subdomain.body as i64);
+            materials.push(subdomain.material as i64);
+        }
+    }
+    piece.point_data = vec![Field::integer("node", nodes)];
+    piece.cell_data = vec![
+        Field::integer("body", bodies),
+        Field::integer("material", materials),
+        Field::integer("rank", vec![rank as i64; subdomain_ids.len()]),
+        Field::integer("subdomain", subdomain_ids),
+    ];
+    piece
+}
+
+/// Adds the solution at a time to the mesh; returns the largest von Mises stress in this rank's elements. `contact` holds
+/// the pairs whose rows are here.
+pub fn record(
+    piece: &mut Piece,
+    time: f64,
+    problem: &TornProblem,
+    solution: &Solution,
+    touching: Touching,
+    contact: &[ContactState],
+) -> f64 {
+    let u = &solution.u;
+    let displacement: Vec<[f64; 3]> = u.iter().flat_map(|u| u.as_chunks::<3>().0).copied().collect();
+    let (stress, plastic): (Vec<f64>, _) = element_states(problem, u).unzip();
+    let largest = stress.iter().fold(0.0, |a: f64, &b| if b.is_nan() || b > a { b } else { a });
+    let mut point_data = vec![Field::vector("displacement", &displacement)];
+    point_data.extend(contact::fields(problem.subdomains, touching, contact));
+    let estimate = match &solution.errors {
+        Some(errors) => errors.elements.concat(),
+        None => vec![f64::NAN; piece.types.len()],
+    };
+    let cell_data = vec![
+        Field::scalar("von_mises", stress),
+        Field::scalar("equivalent_plastic_strain", plastic),
+        Field::scalar("error_estimate", estimate),
+    ];
+    piece.record(time, point_data, cell_data);
+    largest
+}
+
+/// Von Mises stress and equivalent plastic strain of all elements, one increment from what is committed.
+fn element_states<'a>(problem: &'a TornProblem<'_>, u: &'a Torn) -> impl Iterator<Item = (f64, f64)> + use<'a> {
+    problem.subdomains.iter().zip(u).enumerate().flat_map(|(own, (subdomain, u))| {
+        let (material, history) = (&problem.materials[own], problem.committed.history(own));
+        internal::answers(subdomain, material, history, u).into_iter().map(|answer| (answer.von_mises, answer.kappa))
+    })
+}
