@@ -6,6 +6,8 @@
 mod check;
 mod conduct;
 pub mod keeper;
+mod levels;
+mod plan;
 mod resume;
 mod room;
 mod solve;

@@ -18,10 +18,13 @@ use crate::feti::inverse::kernel::RigidModes;
 use crate::material::Material;
 use crate::model;
 use crate::model::discrete::Discrete;
+use crate::monitor::events::Event;
 use crate::random::Random;
+use crate::restart::Standing;
 use crate::scene::Scene;
 use crate::sparse::cholesky::Precision;
 use crate::sparse::pattern::Pattern;
+use crate::study::Watcher;
 
 /// Numbers of ranks to test on: one, even, odd, and more than [`two_bricks`] has subdomains.
 pub const RANKS: [usize; 4] = [1, 2, 3, 5];
@@ -325,4 +328,32 @@ pub fn assert_close(found: &Mat<f64>, expected: &Mat<f64>, tolerance: f64) {
     assert_eq!((found.nrows(), found.ncols()), (expected.nrows(), expected.ncols()));
     let error = (found - expected).norm_max() / expected.norm_max();
     assert!(error <= tolerance, "relative error {error:e}");
+}
+
+/// Stops a solution before so many of its Newton steps, and keeps where it stands.
+pub struct Stopper {
+    /// The step to stop before, from 1.
+    pub before: usize,
+    /// Where it stands then.
+    pub stood: Option<Standing>,
+    asked: usize,
+}
+
+impl Stopper {
+    /// Stops before this step.
+    pub fn new(before: usize) -> Self {
+        Self { before, stood: None, asked: 0 }
+    }
+}
+
+impl Watcher for Stopper {
+    fn tell(&mut self, _event: Event) {}
+
+    fn stops(&mut self, standing: &dyn Fn() -> Standing) -> bool {
+        self.asked += 1;
+        if self.asked == self.before {
+            self.stood = Some(standing());
+        }
+        self.stood.is_some()
+    }
 }

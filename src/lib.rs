@@ -6,7 +6,6 @@
 
 pub mod analytic;
 pub mod assembly;
-pub mod cascade;
 pub mod cli;
 pub mod comm;
 pub mod constraint;

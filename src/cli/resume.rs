@@ -9,16 +9,15 @@ use clap::Args;
 
 use super::conduct::Conduct;
 use super::keeper::Signals;
-use super::solve::{Plan, Setting, carry_out};
+use super::levels::{Setting, carry_out};
+use super::plan::{FORMAT, Plan, program};
 use super::{Failure, find, values};
 use crate::comm::Comm;
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::monitor::progress::Mode;
 use crate::monitor::timing::Timer;
-use crate::restart::checkpoint::Unfit;
 use crate::results::checkpoint::{self, Checkpoint};
-use crate::results::provenance::{COMMIT, VERSION};
 use crate::scene;
 
 /// Arguments of `resume`.
@@ -41,16 +40,6 @@ pub struct Resume {
     conduct: Conduct,
 }
 
-/// What a checkpoint is written by; others are not understood.
-const FORMAT: &str = "fetiplast checkpoint 4";
-
-/// What a checkpoint says of its run.
-pub(super) fn labels(plan: &Plan, scene: &str) -> [(&'static str, String); 4] {
-    let plan = serde_json::to_string(plan).expect("a plan can be written as JSON");
-    let program = format!("{VERSION} ({COMMIT})");
-    [("run/format", FORMAT.into()), ("run/program", program), ("run/plan", plan), ("run/scene", scene.into())]
-}
-
 /// Goes on with a run. Collective.
 ///
 /// # Errors
@@ -65,10 +54,10 @@ pub fn resume(arguments: Resume, comm: &dyn Comm, signals: Signals) -> Result<i3
     if text("run/format")? != FORMAT {
         return Err(unreadable(format!("it is no `{FORMAT}`, but of another version of this program")));
     }
-    let (program, now) = (text("run/program")?, format!("{VERSION} ({COMMIT})"));
-    if program != now {
+    let (written_by, now) = (text("run/program")?, program());
+    if written_by != now {
         monitor.event(&Event::Warning(format!(
-            "the checkpoint was written by fetiplast {program}, this is {now}: the last digits may differ"
+            "the checkpoint was written by fetiplast {written_by}, this is {now}: the last digits may differ"
         )));
     }
     let mut plan: Plan = serde_json::from_str(&text("run/plan")?)
@@ -113,13 +102,5 @@ fn open<'a>(comm: &'a dyn Comm, file: &Path, monitor: &mut Monitor) -> Result<(P
             file.display(),
             before.display()
         ))),
-    }
-}
-
-/// Why a checkpoint is of no use for the scene.
-pub(super) fn unfit(unfit: Unfit) -> Failure {
-    match unfit {
-        Unfit::Mesh => Failure::Scene(unfit.to_string()),
-        Unfit::Unreadable(reason) => Failure::Input(format!("the checkpoint cannot be read: {reason}")),
     }
 }

@@ -9,6 +9,7 @@ use super::Failure;
 use crate::comm::{Comm, all_gather_text};
 use crate::monitor::machine::available_mb;
 use crate::results::provenance::host;
+use crate::sizing::counts::Counted;
 use crate::sizing::memory::Memory;
 
 /// So many times what is left is refused.
@@ -73,4 +74,13 @@ impl Room {
         let ranks = if *ranks == 1 { "1 rank".to_owned() } else { format!("{ranks} ranks") };
         format!("the run would take about {needed_mb:.0} MiB on {host} ({ranks}), which has {available_mb:.0} MiB left")
     }
+}
+
+/// Refuses a run that cannot fit, unless told to begin; what to tell where it hardly does. Collective.
+pub(super) fn make_room(comm: &dyn Comm, counted: &Counted, ignore: bool) -> Result<Option<String>, Failure> {
+    let Some(room) = Room::find(comm, &counted.memory()) else { return Ok(None) };
+    if !ignore {
+        room.refuse()?;
+    }
+    Ok(room.warning())
 }

@@ -2,6 +2,7 @@
 
 use super::ModelError;
 use super::discrete::Discrete;
+use super::stages::{Conditions, Stage};
 use crate::assembly::loads::{self, Load};
 use crate::comm::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
@@ -9,7 +10,6 @@ use crate::constraint::{ConstraintError, Constraints, Support};
 use crate::contact::{ContactError, ContactPair};
 use crate::decomposition::Decomposition;
 use crate::feti::Torn;
-use crate::newton::loading::{Conditions, Stage};
 use crate::scene::{Contact, Scene, Step};
 use crate::vector::dot;
 

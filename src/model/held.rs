@@ -3,6 +3,7 @@
 use super::ModelError;
 use super::conditions;
 use super::discrete::Discrete;
+use super::stages::Stage;
 use crate::comm::Comm;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::equilibrium::Unheld;
@@ -11,7 +12,6 @@ use crate::feti::dual::gather::Gather;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel;
 use crate::feti::inverse::kernel::RigidModes;
-use crate::newton::loading::Stage;
 use crate::scene::Scene;
 
 /// Looks for a motion that nothing holds, as solving does first. Collective.

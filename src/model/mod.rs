@@ -2,7 +2,7 @@
 //!
 //! [`bodies`] reads and makes the meshes, [`contacts`] pairs the surfaces, [`conditions`] has the rows and what changes over the load
 //! history, [`extent`] measures bodies and places,
-//! [`discrete`] joins all to the problem of one rank. [`held`] tells whether anything moves freely.
+//! [`discrete`] joins all to the problem of one rank. [`stages`] are the load steps, [`held`] tells whether anything moves freely.
 
 pub mod bodies;
 pub mod conditions;
@@ -10,6 +10,7 @@ pub mod contacts;
 pub mod discrete;
 pub mod extent;
 pub mod held;
+pub mod stages;
 
 pub use discrete::{Discrete, discretise, discretise_expecting};
 

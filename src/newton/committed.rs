@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::problem::TornProblem;
+use super::problem::{State, TornProblem};
 use crate::assembly::internal;
 use crate::feti::Torn;
 use crate::material::History;
@@ -48,10 +48,10 @@ impl Committed {
 }
 
 impl TornProblem<'_> {
-    /// Commits a solution: from now on the problem is the next increment. Collective.
-    pub fn commit(&mut self, u: &Torn, lambda: &[f64]) {
-        let state = self.evaluate(u);
-        let sizes = Sizes { elastic_norm: self.elastic_norm(u), ..self.measure(u, &state, lambda).1 };
+    /// Commits a displacement, where the problem is in this `state`, with its multipliers: from now on the problem is the next
+    /// increment. Collective.
+    pub fn commit(&mut self, u: &Torn, state: &State, lambda: &[f64]) {
+        let sizes = Sizes { elastic_norm: self.elastic_norm(u), ..self.measure(u, state, lambda).1 };
         self.committed.sizes = self.committed.sizes.larger(sizes);
         self.committed.histories.resize_with(u.len(), Vec::new);
         for (own, history) in

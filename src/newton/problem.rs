@@ -15,6 +15,8 @@ use crate::feti::dual::gather::Gather;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::RigidModes;
 use crate::material::Material;
+use crate::model::Discrete;
+use crate::model::stages::Conditions;
 
 /// What one rank holds of the problem.
 pub struct TornProblem<'a> {
@@ -65,6 +67,36 @@ pub struct State {
 /// Energies and forces are compared with those that are there, and at least with this share of the terms that they are
 /// sums of (in the energy norm, of its root): where bodies move without strain, all that is there is round-off.
 pub(super) const SIGNIFICANT: f64 = 1e-8;
+
+impl<'a> TornProblem<'a> {
+    /// Of a discrete problem, with what is prescribed now; nothing is committed yet.
+    pub fn new(
+        discrete: &'a Discrete,
+        gather: &'a Gather<'a>,
+        space: &'a RowSpace<'a>,
+        sums: &'a NodeSums<'a>,
+        modes: &'a [RigidModes],
+        Conditions { loads, rhs }: Conditions,
+    ) -> Self {
+        let Discrete { materials, constraints, bodies, .. } = discrete;
+        let subdomains = &discrete.decomposition.subdomains[..];
+        let yields = |&material: &usize| materials[material].yield_stress.is_some();
+        Self {
+            subdomains,
+            materials: subdomains.iter().map(|s| materials[s.material]).collect(),
+            modes,
+            loads,
+            rhs,
+            committed: Committed::default(),
+            constraints,
+            gather,
+            coupling: RefCell::new(Coupling::new(constraints)),
+            space,
+            sums,
+            yields: bodies.iter().flat_map(|body| &body.materials).any(yields),
+        }
+    }
+}
 
 impl TornProblem<'_> {
     /// Own subdomains, each with its material and history.
@@ -170,6 +202,12 @@ impl TornProblem<'_> {
         let violation = self.violated(self.slack(u));
         let squares = self.space.dots(&[(&violation, &violation), (&self.rhs, &self.rhs)]);
         squares[0] <= f64::EPSILON * squares[1]
+    }
+
+    /// Rows that act with these multipliers: all equalities, and the contacts that press.
+    pub fn active_rows(&self, lambda: &[f64]) -> Vec<bool> {
+        let rows = self.constraints.rows.iter().zip(lambda);
+        rows.map(|(row, &lambda)| !row.is_inequality() || lambda > 0.0).collect()
     }
 
     /// Number of contact rows with a positive multiplier. One collective.

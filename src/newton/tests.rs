@@ -1,8 +1,7 @@
-use std::cell::{Cell, RefCell};
 use std::sync::Mutex;
 
 use crate::comm::threads;
-use crate::fixture::two_bricks;
+use crate::fixture::{Stopper, two_bricks};
 use crate::model;
 use crate::monitor::timing::Timer;
 use crate::record::summary::Summary;
@@ -29,8 +28,8 @@ fn plastic(sets: &[&str]) -> Scene {
 fn solve(scene: &Scene, ranks: usize) -> (Summary, Vec<u64>) {
     let parts = threads::run(ranks, |comm| {
         let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
-        let solved =
-            study::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("the bodies are held");
+        let solved = study::solve(scene, &discrete, comm, study::Begin::Rest, &Timer::start(), &mut ())
+            .expect("the bodies are held");
         let field = solved.piece.point_data.into_iter().find(|field| field.name == "displacement");
         let mut states = field.map(|field: Field| field.states).unwrap_or_default();
         let Some(Values::Real(u)) = states.pop() else { panic!("displacements are real") };
@@ -165,18 +164,9 @@ fn numbers_without_end_are_an_outcome() {
 fn leave(scene: &Scene, ranks: usize, begin: impl Fn(usize) -> study::Begin + Sync, stop: usize) -> Left {
     let parts = threads::run(ranks, |comm| {
         let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
-        let (asked, stood) = (Cell::new(0), RefCell::new(None));
-        let pause = |standing: &dyn Fn() -> restart::Standing| {
-            asked.set(asked.get() + 1);
-            let stops = asked.get() == stop;
-            if stops {
-                *stood.borrow_mut() = Some(standing());
-            }
-            stops
-        };
-        let begin = begin(comm.rank());
-        let solved = study::solve_from(scene, &discrete, comm, begin, &Timer::start(), &mut |_| (), &pause);
-        (solved.ok().map(|solved| (solved.summary, solved.piece)), stood.into_inner())
+        let mut stopper = Stopper::new(stop);
+        let solved = study::solve(scene, &discrete, comm, begin(comm.rank()), &Timer::start(), &mut stopper);
+        (solved.ok().map(|solved| (solved.summary, solved.piece)), stopper.stood)
     });
     let (solved, stood): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
     Left { solved: solved.into_iter().collect(), stood: stood.into_iter().collect() }

@@ -9,14 +9,14 @@ pub mod meshes;
 pub mod places;
 pub mod state;
 
-use crate::newton::loading;
+use crate::newton::Snapshot;
 use crate::record::rows::StepRow;
 use crate::results::piece::Piece;
 
 /// Where the solution of a scene stands between two Newton steps: all that the rest of it depends on.
 pub struct Standing {
     /// In the load history.
-    pub halt: loading::Halt,
+    pub newton: Snapshot,
     /// The increments reached so far.
     pub rows: Vec<StepRow>,
     /// Their fields; no mesh.

@@ -5,7 +5,7 @@ use crate::assembly::internal;
 use crate::decomposition::Subdomain;
 use crate::element::Kind;
 use crate::feti::Torn;
-use crate::newton::{Solution, TornProblem};
+use crate::newton::{Iterate, Newton, TornProblem};
 use crate::results::piece::{Field, Piece};
 
 /// VTK's number of a kind of cell.
@@ -44,23 +44,16 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
     piece
 }
 
-/// Adds the solution at a time to the mesh; returns the largest von Mises stress in this rank's elements. `contact` holds
+/// Adds the iterate to the mesh, at the time of its increment; returns the largest von Mises stress in this rank's elements. `contact` holds
 /// the pairs whose rows are here.
-pub fn record(
-    piece: &mut Piece,
-    time: f64,
-    problem: &TornProblem,
-    solution: &Solution,
-    touching: Touching,
-    contact: &[ContactState],
-) -> f64 {
-    let u = &solution.u;
+pub fn record(piece: &mut Piece, newton: &Newton, touching: Touching, contact: &[ContactState]) -> f64 {
+    let (problem, Iterate { u, errors, .. }) = (newton.problem(), newton.iterate());
     let displacement: Vec<[f64; 3]> = u.iter().flat_map(|u| u.as_chunks::<3>().0).copied().collect();
     let (stress, plastic): (Vec<f64>, _) = element_states(problem, u).unzip();
     let largest = stress.iter().fold(0.0, |a: f64, &b| if b.is_nan() || b > a { b } else { a });
     let mut point_data = vec![Field::vector("displacement", &displacement)];
     point_data.extend(contact::fields(problem.subdomains, touching, contact));
-    let estimate = match &solution.errors {
+    let estimate = match errors {
         Some(errors) => errors.elements.concat(),
         None => vec![f64::NAN; piece.types.len()],
     };
@@ -69,7 +62,7 @@ pub fn record(
         Field::scalar("equivalent_plastic_strain", plastic),
         Field::scalar("error_estimate", estimate),
     ];
-    piece.record(time, point_data, cell_data);
+    piece.record(newton.at().time(), point_data, cell_data);
     largest
 }
 

@@ -25,8 +25,8 @@ use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::model::discrete::Discrete;
 use crate::model::extent::{Site, diagonal, short, shown};
-use crate::newton::loading::At;
-use crate::newton::{Solution, TornProblem};
+use crate::newton::Newton;
+use crate::newton::path::At;
 use crate::record::rows::StepRow;
 use crate::record::state::{Extreme, Measures};
 use crate::scene::Scene;
@@ -70,15 +70,15 @@ pub(super) fn measure(
     comm: &dyn Comm,
     scene: &Scene,
     discrete: &Discrete,
-    problem: &TornProblem,
-    (at, solution): (At, &Solution),
+    newton: &Newton,
     contact: &[ContactState],
 ) -> Measures {
-    let of_nodes = displacements(comm, discrete, &solution.u);
+    let (problem, at, u) = (newton.problem(), newton.at(), &newton.iterate().u);
+    let of_nodes = displacements(comm, discrete, u);
     let mut state_of = vec![None; discrete.pairs.len()];
     contact.iter().for_each(|state| state_of[state.pair] = Some(state.force));
     let mut partial = Vec::new();
-    let subdomains = problem.subdomains.iter().zip(&solution.u).zip(problem.space.owned());
+    let subdomains = problem.subdomains.iter().zip(u).zip(problem.space.owned());
     for ((subdomain, u), rows) in subdomains {
         let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
         add_body(&mut worst, subdomain, u, diagonal(&discrete.extents[subdomain.body]));

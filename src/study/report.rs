@@ -7,8 +7,8 @@ use crate::constraint::Kind;
 use crate::model::discrete::Discrete;
 use crate::model::held::load_step;
 use crate::newton::balance::BodyBalance;
-use crate::newton::loading::{At, Followed};
-use crate::newton::{self, Solution, StepRecord, TornProblem};
+use crate::newton::path::At;
+use crate::newton::{self, Iterate, Newton, StepRecord, TornProblem};
 use crate::record::counts::{ContactRow, Counters};
 use crate::record::rows::{NewtonRow, StepRow};
 use crate::record::state::{Acting, Errors, Measures, Residuals, State};
@@ -36,20 +36,20 @@ pub(super) fn step_row(
     comm: &dyn Comm,
     scene: &Scene,
     discrete: &Discrete,
-    problem: &TornProblem,
-    (at, solution): (At, &Solution),
+    newton: &Newton,
     contact: &[ContactState],
     von_mises: f64,
 ) -> StepRow {
-    let measures = limits::measure(comm, scene, discrete, problem, (at, solution), contact);
+    let at = newton.at();
+    let measures = limits::measure(comm, scene, discrete, newton, contact);
     StepRow {
         step: at.stage as u64 + 1,
         name: scene.steps()[at.stage].name.clone(),
         increment: at.increment as u64,
         time: at.time(),
         halvings: at.halvings as u64,
-        converged: solution.outcome == newton::Outcome::Converged,
-        state: State { measures, ..state(scene, discrete, problem, solution, contact, von_mises) },
+        converged: newton.outcome() == Some(&newton::Outcome::Converged),
+        state: State { measures, ..state(scene, discrete, newton, contact, von_mises) },
     }
 }
 
@@ -102,9 +102,9 @@ pub(super) fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
 }
 
 /// Contact of every pair whose row is on this rank.
-pub(super) fn contact_states(problem: &TornProblem, solution: &Solution) -> Vec<ContactState> {
-    let slack = problem.slack(&solution.u);
-    let rows = problem.constraints.rows.iter().zip(&slack).zip(&solution.lambda);
+pub(super) fn contact_states(problem: &TornProblem, Iterate { u, lambda, .. }: &Iterate) -> Vec<ContactState> {
+    let slack = problem.slack(u);
+    let rows = problem.constraints.rows.iter().zip(&slack).zip(lambda);
     rows.filter_map(|((row, slack), lambda)| {
         let Kind::Contact { pair } = row.kind else { return None };
         Some(ContactState { pair, force: row.scale * lambda, gap: slack / row.scale })
@@ -116,11 +116,10 @@ pub(super) fn contact_states(problem: &TornProblem, solution: &Solution) -> Vec<
 pub(super) fn summarise(
     scene: &Scene,
     discrete: &Discrete,
-    followed: &Followed,
+    (steps, failure): (&[(usize, StepRecord)], &Option<(At, newton::Outcome)>),
     rows: Vec<StepRow>,
     comm: &dyn Comm,
 ) -> Summary {
-    let Followed { steps, failure, .. } = followed;
     let sizes = sizes(discrete, comm);
     let last = rows.last().map(|row| row.state.clone()).unwrap_or_default();
     let state = State { plastic_elements: rows.iter().filter_map(|row| row.state.plastic_elements).max(), ..last };
@@ -159,47 +158,41 @@ pub(super) fn summarise(
 }
 
 /// What a solution is like. Collective.
-fn state(
-    scene: &Scene,
-    discrete: &Discrete,
-    problem: &TornProblem,
-    solution: &Solution,
-    contact: &[ContactState],
-    von_mises: f64,
-) -> State {
-    let at_end = problem.evaluate(&solution.u);
-    let reactions = problem.reactions(&at_end, &solution.lambda, discrete.supports.len());
-    let (balance, residual_balance) = problem.balance(&at_end, &solution.lambda, discrete.bodies.len());
+fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[ContactState], von_mises: f64) -> State {
+    let (problem, Iterate { u, lambda, state, residuals, errors, ended_by_accuracy }) =
+        (newton.problem(), newton.iterate());
+    let reactions = problem.reactions(state, lambda, discrete.supports.len());
+    let (balance, residual_balance) = problem.balance(state, lambda, discrete.bodies.len());
     let contact_forces = contact_forces(scene, problem, discrete, contact);
     let names = discrete.supports.iter().map(|s| s.name.clone());
     let maximum = |x: f64| problem.space.maximum(x);
     State {
-        plastic_elements: Some(solution.plastic_elements as u64),
-        active_contacts: Some(problem.active_contacts(&solution.lambda) as u64),
+        plastic_elements: Some(state.plastic as u64),
+        active_contacts: Some(problem.active_contacts(lambda) as u64),
         contact_force: Some(std::array::from_fn(|axis| {
             contact_forces.iter().fold(0.0, |sum, force| sum + force[axis])
         })),
         contact_forces: discrete.contacts.iter().cloned().zip(contact_forces).collect(),
         reactions: names.zip(reactions).collect(),
-        external_work: Some(solution.external_work),
-        internal_energy: Some(solution.internal_energy),
-        energy: Some(solution.energy),
-        max_displacement: Some(maximum(newton::residuals::largest_displacement(&solution.u))),
+        external_work: Some(state.external_work),
+        internal_energy: Some(state.internal_energy),
+        energy: Some(state.energy),
+        max_displacement: Some(maximum(newton::residuals::largest_displacement(u))),
         max_von_mises: Some(maximum(von_mises)),
         residuals: Residuals {
-            equilibrium: Some(solution.residuals.equilibrium),
-            gluing: Some(solution.residuals.gluing),
-            gap: Some(solution.residuals.gap),
-            complementarity: Some(solution.residuals.complementarity),
+            equilibrium: Some(residuals.equilibrium),
+            gluing: Some(residuals.gluing),
+            gap: Some(residuals.gap),
+            complementarity: Some(residuals.complementarity),
             balance: Some(residual_balance),
         },
         balance: scene.body.keys().cloned().zip(balance.iter().map(acting)).collect(),
         errors: Errors {
-            duality_gap: solution.errors.as_ref().map(|errors| errors.gap),
-            algebraic: solution.errors.as_ref().map(|errors| errors.algebraic),
-            algebraic_is_bound: solution.errors.as_ref().map(|errors| errors.is_bound),
-            discretisation: solution.errors.as_ref().map(|errors| errors.discretisation),
-            ended_by_accuracy: Some(solution.ended_by_accuracy),
+            duality_gap: errors.as_ref().map(|errors| errors.gap),
+            algebraic: errors.as_ref().map(|errors| errors.algebraic),
+            algebraic_is_bound: errors.as_ref().map(|errors| errors.is_bound),
+            discretisation: errors.as_ref().map(|errors| errors.discretisation),
+            ended_by_accuracy: Some(*ended_by_accuracy),
         },
         measures: Measures::default(),
     }

@@ -30,7 +30,8 @@ struct Outcome {
 fn solve(scene: &Scene, ranks: usize) -> Outcome {
     let parts = threads::run(ranks, |comm| {
         let discrete = crate::model::discrete::discretise(scene, comm).expect("the scene has a discrete problem");
-        let solved = super::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("it is held");
+        let solved =
+            super::solve(scene, &discrete, comm, super::Begin::Rest, &Timer::start(), &mut ()).expect("it is held");
         let of = |(s, u): (&crate::decomposition::Subdomain, &Vec<f64>)| {
             s.points.iter().copied().zip(u.as_chunks().0.iter().copied()).collect::<Vec<_>>()
         };

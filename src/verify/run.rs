@@ -49,7 +49,7 @@ impl<'a> Run<'a> {
         if let Some(value) = case.force() {
             discrete.loads[0] = Load::Field { body: 0, value, factor: 1.0 };
         }
-        let solved = study::solve(&scene, &discrete, comm, None, &timer, &mut |_| {})?;
+        let solved = study::solve(&scene, &discrete, comm, study::Begin::Rest, &timer, &mut ())?;
         let seconds = timer.total_seconds();
         let work = PhaseTable::gather(comm, &timer).work();
         let read = |phase: &str| work.get(phase).map_or(0.0, |work| work.bytes) / 1e9;

@@ -116,9 +116,9 @@ impl Stacked {
             self.upper.toml("upper", self.lower.height + self.gap),
         );
         let scene = Scene::from_text(&text, "random", 1, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
-        let solved = model::discretise(&scene, &Solo)
-            .map_err(StudyError::from)
-            .and_then(|discrete| study::solve(&scene, &discrete, &Solo, None, &Timer::default(), &mut |_| ()));
+        let solved = model::discretise(&scene, &Solo).map_err(StudyError::from).and_then(|discrete| {
+            study::solve(&scene, &discrete, &Solo, study::Begin::Rest, &Timer::default(), &mut ())
+        });
         match solved {
             Ok(solved) => {
                 assert_eq!(solved.summary.converged, Some(true), "{self:?} {sides}: {:?}", solved.summary.error);

@@ -17,8 +17,8 @@ struct Solution {
 fn solve(scene: &Scene, ranks: usize) -> Solution {
     let parts = threads::run(ranks, |comm| {
         let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
-        let solved =
-            study::solve(scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).expect("the bodies are held");
+        let solved = study::solve(scene, &discrete, comm, study::Begin::Rest, &Timer::start(), &mut ())
+            .expect("the bodies are held");
         let mut stresses = Vec::new();
         for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(&solved.u) {
             let material = discrete.materials[subdomain.material];

@@ -16,7 +16,7 @@ use crate::model::discrete::Discrete;
 use crate::restart::places::{Places, Wanted};
 use crate::results::checkpoint::Checkpoint;
 
-/// The arrays; multipliers but for those of the last solution's contacts are zero. Collective.
+/// The arrays; multipliers but for those of the contacts in the last increment are zero. Collective.
 ///
 /// # Errors
 /// If they cannot be read; the same on every rank.
@@ -38,19 +38,19 @@ pub(super) fn read(
         (0..rows.len()).filter_map(|row| Some((contact(discrete, row)?, row))).collect();
     let contacts = Wanted::find(arrays, "contacts/condition", |key| of_contacts.get(&key).copied())?;
     let mut kept: Vec<bool> = rows.iter().map(|row| !row.is_inequality()).collect();
-    let mut last_lambda = vec![0.0; rows.len()];
+    let mut reached_lambda = vec![0.0; rows.len()];
     let states = contacts.read::<i64>(arrays, "contacts/kept", 0)?;
     let forces = contacts.read::<f64>(arrays, "contacts/last_force", 0)?;
     for (((_, row), state), force) in contacts.rows().zip(states).zip(forces) {
-        (kept[row], last_lambda[row]) = (state == 1, force / rows[row].scale);
+        (kept[row], reached_lambda[row]) = (state == 1, force / rows[row].scale);
     }
 
     let [of_points, of_cells] = recorded;
     Ok(Arrays {
         u: torn("points/displacement")?,
-        last_u: torn("points/last")?,
+        reached_u: torn("points/last")?,
         lambda: vec![0.0; rows.len()],
-        last_lambda,
+        reached_lambda,
         kept,
         flows: vec![Flow::default(); subdomains.len()],
         bases: vec![Bases::default(); subdomains.len()],

@@ -2,10 +2,11 @@
 
 use std::collections::HashMap;
 
-use super::{Arrays, Recorded, basis, lowest_node};
+use super::arrays::basis;
+use super::{Arrays, Recorded, lowest_node};
 use crate::assembly::flow::Flow;
+use crate::comm::Comm;
 use crate::comm::agree::agree;
-use crate::comm::{Comm, Shares};
 use crate::feti::Torn;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::basis::{Bases, Basis};
@@ -39,82 +40,119 @@ pub(super) fn read(
     file: &Checkpoint,
     recorded: &[Recorded; 2],
 ) -> Result<Arrays, Miss> {
-    let Discrete { decomposition, constraints, .. } = discrete;
-    let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains);
-    let space = RowSpace::new(comm, shares, constraints);
-    let first = shares.begin(comm.rank());
-    let demand =
-        |same: bool| agree(comm, "subdomains", if same { Ok(()) } else { Err("others") }).map_err(|_| Miss::Others);
-    let part = |name: &str, own: &dyn Fn(usize) -> Option<usize>| -> Result<Part, Miss> {
-        let counts = file.whole::<i64>(&format!("subdomains/{name}"))?;
-        let fits = counts.len() == shares.total()
-            && (0..subdomains.len()).all(|k| own(k).is_none_or(|n| counts[first + k] == n as i64));
-        demand(fits)?;
-        let counts: Vec<usize> = counts.iter().map(|&count| count as usize).collect();
-        let begin = counts[..first].iter().sum();
-        Ok(Part { begin, counts: counts[first..][..subdomains.len()].to_vec(), total: counts.iter().sum() })
-    };
-    let points = part("points", &|own| Some(subdomains[own].nodes.len()))?;
-    let cells = part("cells", &|own| Some(subdomains[own].elements.len()))?;
-    let rows = part("rows", &|own| Some(space.owned()[own].len()))?;
-    let histories = part("histories", &|_| None)?;
-    let alone = Part { begin: first, counts: vec![1; subdomains.len()], total: shares.total() };
-
-    let clusters = (first..first + subdomains.len()).map(|id| decomposition.clusters.of(id) as i64);
-    let nodes = subdomains.iter().flat_map(|s| &s.nodes).map(|&node| node as i64);
-    let elements = subdomains.iter().flat_map(|s| s.elements.iter().flat_map(|element| key(element, &s.nodes)));
-    let owned = space.owned().iter().flatten();
-    let of_rows = owned.map(|&row| lowest_node(&constraints.rows[row as usize]) as i64);
-    let same = alone.read::<i64>(file, "subdomains/cluster", 0)?.into_iter().eq(clusters)
-        & points.read::<i64>(file, "points/node", 0)?.into_iter().eq(nodes)
-        & cells.read::<i64>(file, "cells/nodes", 0)?.into_iter().eq(elements)
-        & rows.read::<i64>(file, "rows/node", 0)?.into_iter().eq(of_rows);
-    demand(same)?;
+    let reader = Reader::new(comm, discrete, file)?;
+    let Reader { points, cells, .. } = &reader;
     let torn = |name: &str| -> Result<Torn, String> { Ok(points.split(points.read(file, name, 0)?, 3)) };
-    let flows = |name: &str| -> Result<Vec<Flow>, Miss> {
-        let part = part(name, &|_| None)?;
-        let directions = part.split(part.read::<f64>(file, &format!("{name}/direction"), 0)?, 6);
-        Ok(directions.into_iter().map(|flow| Flow::new(flow.as_chunks::<6>().0.to_vec())).collect())
-    };
-    let bases = |name: &str| -> Result<Vec<Option<Basis>>, Miss> {
-        let codes = alone.read::<i64>(file, &format!("subdomains/{name}"), 0)?;
-        let (torn, flows) = (torn(&format!("points/{name}"))?, flows(&format!("{name}_flow"))?);
-        Ok(codes.into_iter().zip(torn).zip(flows).map(|((code, u), flow)| basis(code, u, flow)).collect())
-    };
-    let drift = alone.read::<f64>(file, "subdomains/drift", 0)?;
-    let (factor, interior) = (bases("factor")?, bases("interior")?);
-    let bases = factor.into_iter().zip(interior).zip(drift);
-    let bases = bases.map(|((factor, interior), drift)| Bases { factor, interior, drift }).collect();
-
-    let multiplier = rows.read::<f64>(file, "rows/multiplier", 0)?;
-    let last = rows.read::<f64>(file, "rows/last", 0)?;
-    let kept = rows.read::<i64>(file, "rows/kept", 0)?;
-    let mut of_rows = vec![[0; 3]; constraints.rows.len()];
-    let owned = space.owned().iter().flatten();
-    for (row, ((multiplier, last), kept)) in owned.zip(multiplier.into_iter().zip(last).zip(kept)) {
-        of_rows[*row as usize] = [multiplier.to_bits(), last.to_bits(), kept as u64];
-    }
-    complete(comm, shares, discrete, &mut of_rows);
-    let column = |k: usize| of_rows.iter().map(move |row| f64::from_bits(row[k])).collect::<Vec<f64>>();
-
-    let strains = histories.read::<f64>(file, "histories/plastic_strain", 0)?;
-    let kappas = histories.read::<f64>(file, "histories/kappa", 0)?;
-    let strains = strains.as_chunks::<6>().0.iter();
-    let remembered = strains.zip(kappas).map(|(&plastic_strain, kappa)| History { plastic_strain, kappa }).collect();
+    let (of_rows, kept) = reader.rows()?;
     let [of_points, of_cells] = recorded;
     Ok(Arrays {
         u: torn("points/displacement")?,
-        last_u: torn("points/last")?,
-        lambda: column(0),
-        last_lambda: column(1),
-        kept: of_rows.iter().map(|row| row[2] == 1).collect(),
-        flows: flows("flow")?,
-        bases,
-        histories: histories.split(remembered, 1),
+        reached_u: torn("points/last")?,
+        lambda: of_rows.iter().map(|row| row[0]).collect(),
+        reached_lambda: of_rows.iter().map(|row| row[1]).collect(),
+        kept,
+        flows: reader.flows("flow")?,
+        bases: reader.bases(&torn)?,
+        histories: reader.histories()?,
         point_data: of_points
             .read(|(name, _, k)| points.read(file, name, k), |(name, _, k)| points.read(file, name, k))?,
         cell_data: of_cells.read(|(name, _, k)| cells.read(file, name, k), |(name, _, k)| cells.read(file, name, k))?,
     })
+}
+
+/// Reads what belongs to own subdomains.
+struct Reader<'a> {
+    comm: &'a dyn Comm,
+    discrete: &'a Discrete,
+    file: &'a Checkpoint<'a>,
+    /// Rows that each own subdomain owns.
+    owned: Vec<Vec<u32>>,
+    alone: Part,
+    points: Part,
+    cells: Part,
+    rows: Part,
+}
+
+impl<'a> Reader<'a> {
+    /// Of a file on the same subdomains. Collective.
+    fn new(comm: &'a dyn Comm, discrete: &'a Discrete, file: &'a Checkpoint<'a>) -> Result<Self, Miss> {
+        let Discrete { decomposition, constraints, .. } = discrete;
+        let (shares, own) = (&decomposition.shares, &decomposition.subdomains);
+        let owned = RowSpace::new(comm, shares, constraints).owned().to_vec();
+        let part = |name: &str, count: &dyn Fn(usize) -> Option<usize>| Part::find(comm, discrete, file, name, count);
+        let alone = Part { begin: shares.begin(comm.rank()), counts: vec![1; own.len()], total: shares.total() };
+        let points = part("points", &|k| Some(own[k].nodes.len()))?;
+        let cells = part("cells", &|k| Some(own[k].elements.len()))?;
+        let rows = part("rows", &|k| Some(owned[k].len()))?;
+        let reader = Self { comm, discrete, file, owned, alone, points, cells, rows };
+        demand(comm, reader.is_same()?)?;
+        Ok(reader)
+    }
+
+    /// Whether clusters, nodes, elements and rows of own subdomains are those of the file.
+    fn is_same(&self) -> Result<bool, String> {
+        let Self { discrete: Discrete { decomposition, constraints, .. }, file, .. } = *self;
+        let own = &decomposition.subdomains;
+        let clusters = (self.alone.begin..self.alone.begin + own.len()).map(|id| decomposition.clusters.of(id) as i64);
+        let nodes = own.iter().flat_map(|s| &s.nodes).map(|&node| node as i64);
+        let elements = own.iter().flat_map(|s| s.elements.iter().flat_map(|element| key(element, &s.nodes)));
+        let rows = self.owned.iter().flatten().map(|&row| lowest_node(&constraints.rows[row as usize]) as i64);
+        // All of them are read: reading is collective.
+        Ok(self.alone.read::<i64>(file, "subdomains/cluster", 0)?.into_iter().eq(clusters)
+            & self.points.read::<i64>(file, "points/node", 0)?.into_iter().eq(nodes)
+            & self.cells.read::<i64>(file, "cells/nodes", 0)?.into_iter().eq(elements)
+            & self.rows.read::<i64>(file, "rows/node", 0)?.into_iter().eq(rows))
+    }
+
+    /// A group whose subdomains may have any number of rows.
+    fn part(&self, name: &str) -> Result<Part, Miss> {
+        Part::find(self.comm, self.discrete, self.file, name, &|_| None)
+    }
+
+    fn flows(&self, name: &str) -> Result<Vec<Flow>, Miss> {
+        let part = self.part(name)?;
+        let directions = part.split(part.read::<f64>(self.file, &format!("{name}/direction"), 0)?, 6);
+        Ok(directions.into_iter().map(|flow| Flow::new(flow.as_chunks::<6>().0.to_vec())).collect())
+    }
+
+    fn bases(&self, torn: &dyn Fn(&str) -> Result<Torn, String>) -> Result<Vec<Bases>, Miss> {
+        let of = |name: &str| -> Result<Vec<Option<Basis>>, Miss> {
+            let codes = self.alone.read::<i64>(self.file, &format!("subdomains/{name}"), 0)?;
+            let (torn, flows) = (torn(&format!("points/{name}"))?, self.flows(&format!("{name}_flow"))?);
+            Ok(codes.into_iter().zip(torn).zip(flows).map(|((code, u), flow)| basis(code, u, flow)).collect())
+        };
+        let drift = self.alone.read::<f64>(self.file, "subdomains/drift", 0)?;
+        let bases = of("factor")?.into_iter().zip(of("interior")?).zip(drift);
+        Ok(bases.map(|((factor, interior), drift)| Bases { factor, interior, drift }).collect())
+    }
+
+    /// Multiplier and last multiplier of each row on this rank, and whether it is kept.
+    fn rows(&self) -> Result<(Vec<[f64; 2]>, Vec<bool>), Miss> {
+        let Self { comm, discrete, file, .. } = *self;
+        let multiplier = self.rows.read::<f64>(file, "rows/multiplier", 0)?;
+        let last = self.rows.read::<f64>(file, "rows/last", 0)?;
+        let kept = self.rows.read::<i64>(file, "rows/kept", 0)?;
+        let mut of_rows = vec![[0; 3]; discrete.constraints.rows.len()];
+        let values = multiplier.into_iter().zip(last).zip(kept);
+        for (row, ((multiplier, last), kept)) in self.owned.iter().flatten().zip(values) {
+            of_rows[*row as usize] = [multiplier.to_bits(), last.to_bits(), kept as u64];
+        }
+        complete(comm, discrete, &mut of_rows);
+        Ok(of_rows.iter().map(|row| ([row[0], row[1]].map(f64::from_bits), row[2] == 1)).unzip())
+    }
+
+    fn histories(&self) -> Result<Vec<Vec<History>>, Miss> {
+        let part = self.part("histories")?;
+        let strains = part.read::<f64>(self.file, "histories/plastic_strain", 0)?;
+        let kappas = part.read::<f64>(self.file, "histories/kappa", 0)?;
+        let points = strains.as_chunks::<6>().0.iter().zip(kappas);
+        Ok(part.split(points.map(|(&plastic_strain, kappa)| History { plastic_strain, kappa }).collect(), 1))
+    }
+}
+
+/// Whether all ranks find it the same.
+fn demand(comm: &dyn Comm, same: bool) -> Result<(), Miss> {
+    agree(comm, "subdomains", if same { Ok(()) } else { Err("others") }).map_err(|_| Miss::Others)
 }
 
 /// The rows of an array that belong to own subdomains.
@@ -126,6 +164,24 @@ struct Part {
 }
 
 impl Part {
+    /// Of a group whose number of rows a subdomain the file tells; own subdomains have these counts, where they are known.
+    fn find(
+        comm: &dyn Comm,
+        discrete: &Discrete,
+        file: &Checkpoint,
+        name: &str,
+        count: &dyn Fn(usize) -> Option<usize>,
+    ) -> Result<Self, Miss> {
+        let shares = &discrete.decomposition.shares;
+        let (first, own) = (shares.begin(comm.rank()), discrete.decomposition.subdomains.len());
+        let counts = file.whole::<i64>(&format!("subdomains/{name}"))?;
+        let fits = |k: usize| count(k).is_none_or(|n| counts[first + k] == n as i64);
+        demand(comm, counts.len() == shares.total() && (0..own).all(fits))?;
+        let counts: Vec<usize> = counts.iter().map(|&count| count as usize).collect();
+        let begin = counts[..first].iter().sum();
+        Ok(Self { begin, counts: counts[first..][..own].to_vec(), total: counts.iter().sum() })
+    }
+
     /// Of one of several states.
     fn read<T: Number>(&self, file: &Checkpoint, name: &str, state: u64) -> Result<Vec<T>, String> {
         let begin = state * self.total as u64 + self.begin as u64;
@@ -140,8 +196,8 @@ impl Part {
 }
 
 /// Fills in what ranks know of rows that they hold but do not own, from those that do. Collective.
-fn complete(comm: &dyn Comm, shares: &Shares, discrete: &Discrete, rows: &mut [[u64; 3]]) {
-    let constraints = &discrete.constraints;
+fn complete(comm: &dyn Comm, discrete: &Discrete, rows: &mut [[u64; 3]]) {
+    let (constraints, shares) = (&discrete.constraints, &discrete.decomposition.shares);
     let blocks = constraints.blocks.iter().zip(&constraints.block_subdomains);
     let (mut own, mut foreign) = (HashMap::new(), vec![Vec::new(); comm.size()]);
     for (block, subdomains) in blocks {

@@ -1,12 +1,11 @@
 //! Solutions that go on on other subdomains, from before any of their Newton steps.
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::{contact, pack, unpack};
 use crate::comm::solo::Solo;
-use crate::fixture::two_bricks;
+use crate::fixture::{Stopper, two_bricks};
 use crate::model;
 use crate::model::discrete::Discrete;
 use crate::monitor::timing::Timer;
@@ -37,9 +36,9 @@ fn scene(sets: &[&str]) -> Scene {
 type Contacts = BTreeMap<[i64; 3], (bool, f64)>;
 
 fn contacts(discrete: &Discrete, standing: &Standing) -> Contacts {
-    let newton = &standing.halt.standing;
+    let newton = &standing.newton;
     let Some(held) = newton.held.as_ref().or(newton.solver.programs.kept.as_ref()) else { return Contacts::new() };
-    let force = |row: usize| standing.halt.last.as_ref().map_or(0.0, |last| last.lambda[row]);
+    let force = |row: usize| newton.reached.as_ref().map_or(0.0, |reached| reached.lambda[row]);
     let rows = discrete.constraints.rows.iter().enumerate();
     rows.filter_map(|(k, row)| Some((contact(discrete, k)?, (held[k], row.scale * force(k))))).collect()
 }
@@ -51,20 +50,15 @@ fn solve(
     (stop, file): (usize, &Path),
 ) -> Result<(Summary, Piece), Contacts> {
     let discrete = model::discretise(scene, &Solo).expect("the scene has a discrete problem");
-    let (asked, touching) = (Cell::new(0), Cell::default());
-    let pause = |standing: &dyn Fn() -> Standing| {
-        asked.set(asked.get() + 1);
-        let stops = asked.get() == stop;
-        if stops {
-            touching.set(contacts(&discrete, &standing()));
-            let (texts, arrays) = pack(&Solo, &discrete, standing());
-            checkpoint::write(&Solo, file, &texts, &arrays).expect("there is room");
-        }
-        stops
-    };
-    let begin = begin(&discrete);
-    let solved = study::solve_from(scene, &discrete, &Solo, begin, &Timer::start(), &mut |_| (), &pause);
-    solved.map(|solved| (solved.summary, solved.piece)).map_err(|_| touching.take())
+    let (begin, mut stopper) = (begin(&discrete), Stopper::new(stop));
+    let solved = study::solve(scene, &discrete, &Solo, begin, &Timer::start(), &mut stopper);
+    solved.map(|solved| (solved.summary, solved.piece)).map_err(|_| {
+        let stood = stopper.stood.expect("it was stopped");
+        let touching = contacts(&discrete, &stood);
+        let (texts, arrays) = pack(&Solo, &discrete, stood);
+        checkpoint::write(&Solo, file, &texts, &arrays).expect("there is room");
+        touching
+    })
 }
 
 /// From a checkpoint, to the end or another checkpoint: on other subdomains if contacts there are given, which are those here

@@ -6,6 +6,7 @@ use crate::monitor::timing::Timer;
 use crate::record::state::Extreme;
 use crate::record::summary::Summary;
 use crate::scene::Scene;
+use crate::study;
 
 /// What a built-in scene ends with after these changes, the same on any ranks.
 fn solve(name: &str, sets: &[&str]) -> Summary {
@@ -14,7 +15,7 @@ fn solve(name: &str, sets: &[&str]) -> Summary {
     let mut found = RANKS.into_iter().map(|ranks| {
         let summaries = threads::run(ranks, |comm| {
             let discrete = crate::model::discrete::discretise(&scene, comm).unwrap();
-            super::super::solve(&scene, &discrete, comm, None, &Timer::start(), &mut |_| ()).unwrap().summary
+            study::solve(&scene, &discrete, comm, study::Begin::Rest, &Timer::start(), &mut ()).unwrap().summary
         });
         assert!(summaries.iter().all(|s| s.warnings == summaries[0].warnings));
         summaries.into_iter().next().unwrap()

@@ -6,21 +6,50 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::Solved;
 use crate::assembly::internal;
 use crate::comm::{Comm, all_gather_u64};
+use crate::constraint::Kind;
 use crate::contact::ContactPair;
+use crate::decomposition::Cut;
 use crate::decomposition::{BodyMesh, Subdomain, bricks};
 use crate::feti::Torn;
 use crate::material::Material;
 use crate::mesh::Brick;
+use crate::model::Discrete;
+use crate::model::bodies;
+use crate::model::discrete::cut;
+use crate::newton;
+use crate::scene::Scene;
+
+/// What a solved scene suggests as the start on a finer mesh of the same bodies. Collective.
+pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) -> newton::Start {
+    let (coarse, solved) = coarse;
+    let u = interpolate(
+        comm,
+        (&coarse.bodies, &coarse.decomposition.subdomains, &solved.u),
+        (&fine.bodies, &fine.decomposition.subdomains),
+    );
+    let (from, to) = ((&coarse.bodies[..], &coarse.pairs[..]), (&fine.bodies[..], &fine.pairs[..]));
+    let closed = closed_contacts(comm, from, &solved.closed, to);
+    let held = |kind| if let Kind::Contact { pair } = kind { closed[pair] } else { true };
+    newton::Start { u, held: fine.constraints.rows.iter().map(|row| held(row.kind)).collect() }
+}
+
+/// Which boxes of a finer mesh are likely to yield, from where a solved scene does; see [`discretise_expecting`]. `None` if
+/// the mesh is not cut into boxes. Collective.
+pub fn expected_yielding(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<Vec<bool>>> {
+    let bodies = bodies::bricks(fine)?;
+    let Cut::Bricks(cells) = cut(&fine.decomposition.method, &bodies) else { return None };
+    let (coarse, solved) = coarse;
+    let material = |s: &Subdomain| &coarse.materials[s.material];
+    let coarse = (&coarse.bodies[..], &coarse.decomposition.subdomains[..], &solved.u);
+    Some(yielding(comm, coarse, material, (&bodies, cells)))
+}
 
 /// Displacement of the coarse mesh at the nodes of own fine subdomains. Copies of a node get the same bits, on any
 /// number of ranks. Collective.
-pub fn interpolate(
-    comm: &dyn Comm,
-    coarse: (&[BodyMesh], &[Subdomain], &Torn),
-    fine: (&[BodyMesh], &[Subdomain]),
-) -> Torn {
+fn interpolate(comm: &dyn Comm, coarse: (&[BodyMesh], &[Subdomain], &Torn), fine: (&[BodyMesh], &[Subdomain])) -> Torn {
     let (coarse_bodies, coarse_subdomains, u) = coarse;
     let (fine_bodies, fine_subdomains) = fine;
     let around: Vec<Vec<(Vec<u64>, Vec<f64>)>> = fine_subdomains
@@ -82,7 +111,7 @@ fn fetch(comm: &dyn Comm, subdomains: &[Subdomain], u: &Torn, needed: HashSet<u6
 
 /// Which fine contact pairs are closed: those whose slave node has a closed pair's as the nearest coarse node. `closed`
 /// lists closed coarse pairs of this rank by index. Collective.
-pub fn closed_contacts(
+fn closed_contacts(
     comm: &dyn Comm,
     coarse: (&[BodyMesh], &[ContactPair]),
     closed: &[u64],
@@ -108,7 +137,7 @@ pub fn closed_contacts(
 
 /// Which of the boxes of so many cells of each body of a finer mesh, x fastest, are likely to yield, from where the
 /// coarse one does. Collective.
-pub fn yielding<'a>(
+fn yielding<'a>(
     comm: &dyn Comm,
     coarse: (&[BodyMesh], &[Subdomain], &Torn),
     material: impl Fn(&Subdomain) -> &'a Material,

@@ -1,0 +1,51 @@
+//! What a scene prescribes over its load history: straight lines from the end of one load step to the end of the next.
+
+use crate::feti::Torn;
+
+/// What is prescribed at one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Conditions {
+    /// `f`: nodal forces of each own subdomain.
+    pub loads: Torn,
+    /// `c`: right-hand sides of this rank's rows.
+    pub rhs: Vec<f64>,
+}
+
+/// A straight part of the history: a load step of the scene.
+pub struct Stage {
+    /// What is prescribed at its end.
+    pub end: Conditions,
+    /// Equal increments that lead there, at least one.
+    pub increments: usize,
+    /// How often an increment may be halved.
+    pub halvings: u32,
+}
+
+impl Conditions {
+    /// A fraction of the way from here to `end`; exactly `end` at 1.
+    pub fn towards(&self, end: &Self, fraction: f64) -> Self {
+        if fraction == 1.0 {
+            return end.clone();
+        }
+        let between = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + fraction * (b - a)).collect();
+        Self {
+            loads: self.loads.iter().zip(&end.loads).map(|(a, b)| between(a, b)).collect(),
+            rhs: between(&self.rhs, &end.rhs),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conditions_move_in_straight_lines_and_arrive_exactly() {
+        let at = |x: f64| Conditions { loads: vec![vec![x, 0.1], vec![3.0 * x]], rhs: vec![-x] };
+        let end = at(0.3);
+        assert_eq!(at(0.1).towards(&end, 1.0), end);
+        let middle = at(0.1).towards(&end, 0.5);
+        assert!((middle.loads[0][0] - 0.2).abs() < 1e-16 && middle.loads[0][1] == 0.1);
+        assert!((middle.loads[1][0] - 0.6).abs() < 1e-16 && (middle.rhs[0] + 0.2).abs() < 1e-16);
+    }
+}

@@ -1,0 +1,387 @@
+//! A history of loads as a value: Newton's method for each increment, one step at a time.
+//!
+//! [`Newton::step`] takes the iterate one step further. When [`Newton::outcome`] is known the increment has been reached, or
+//! given up; [`Newton::advance`] goes on to the next one, or to half of the one that failed. Between any two calls
+//! [`Newton::snapshot`] has all that the rest depends on.
+
+use std::mem::{replace, take};
+
+use super::damping::{self, Damped};
+use super::errors::Errors;
+use super::forcing::{self, Forcing};
+use super::outcome::{Outcome, StepRecord};
+use super::path::{At, Attempt, Path};
+use super::problem::{State, TornProblem};
+use super::residuals::Residuals;
+use super::snapshot::{Reached, Snapshot};
+use super::step::{SolverState, Step, StepSolver};
+use crate::feti::Torn;
+use crate::model::stages::{Conditions, Stage};
+use crate::monitor::timing::Timer;
+use crate::qp;
+
+/// How often a step that does not lower the energy is tried again, more exactly each time.
+const TRIALS: usize = 3;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Bound on `|u+ - u|_e / (|u+|_e + |u|_e)` (paper, section 5).
+    pub tolerance: f64,
+    /// Bound on every one of the true residuals.
+    pub residual: f64,
+    /// Steps at most.
+    pub limit: usize,
+    /// An algebraic error of this share of the discretisation error is small enough, whatever the other two say.
+    pub accuracy: Option<f64>,
+}
+
+/// How a history begins.
+pub enum Begin {
+    /// From rest.
+    Rest,
+    /// Near the solution of the first increment.
+    Near(Start),
+    /// Where another one stood, whose conditions it shares.
+    At(Box<Snapshot>),
+}
+
+/// Where to start from.
+pub struct Start {
+    /// Torn displacement.
+    pub u: Torn,
+    /// Rows that hold there: all equalities and the closed contacts.
+    pub held: Vec<bool>,
+}
+
+/// A displacement with its multipliers, and what is known of both.
+pub struct Iterate {
+    /// Torn displacement; after a step copies agree and the bodies do not overlap, to round-off.
+    pub u: Torn,
+    /// Multipliers of this rank's rows.
+    pub lambda: Vec<f64>,
+    /// Internal forces and energies at `u`.
+    pub state: State,
+    /// Residuals of the glued problem.
+    pub residuals: Residuals,
+    /// How exact it is. Known at the end of an iteration, unless no step was taken or numbers are not finite.
+    pub errors: Option<Errors>,
+    /// Whether the accuracy ended the iteration, before the criteria were met.
+    pub ended_by_accuracy: bool,
+}
+
+/// What [`Newton::advance`] did.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Next {
+    /// The next increment, or part of one, is to be tried.
+    Increment,
+    /// The attempt that led there failed like this; its first half is to be tried.
+    Half(At, Outcome),
+    /// The history is over: all of it was reached, or it was given up.
+    End,
+}
+
+/// What became of the trial of a step.
+enum Trial {
+    Accepted(Step, Damped),
+    /// To be tried again, more exactly.
+    Refused(Step),
+    Ended(Outcome),
+}
+
+/// Newton's method on its way through a history of loads.
+pub struct Newton<'a> {
+    problem: TornProblem<'a>,
+    solver: StepSolver<'a>,
+    settings: Settings,
+    path: Path,
+    attempt: Attempt,
+    iterate: Iterate,
+    /// Whether the iterate is admissible: only then `J` may not grow.
+    admissible: bool,
+    forcing: Forcing,
+    outcome: Option<Outcome>,
+    reached: Option<Reached>,
+    steps: Vec<(usize, StepRecord)>,
+    /// Steps of attempts before this one.
+    before: usize,
+}
+
+impl<'a> Newton<'a> {
+    /// A history through these stages, at least one; `problem` comes with what is prescribed at the beginning. Collective.
+    pub fn new(
+        mut problem: TornProblem<'a>,
+        mut solver: StepSolver<'a>,
+        settings: Settings,
+        stages: Vec<Stage>,
+        begin: Begin,
+        timer: &Timer,
+    ) -> Self {
+        let path = Path { begin: Conditions { loads: take(&mut problem.loads), rhs: take(&mut problem.rhs) }, stages };
+        let rest = |problem: &TornProblem| (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
+        let (mut attempt, mut forcing) = (Attempt::FIRST, Forcing::default());
+        let (mut reached, mut steps, mut before, mut stood) = (None, Vec::new(), 0, None);
+        let ((u, lambda), held) = match begin {
+            Begin::Rest => (rest(&problem), None),
+            Begin::Near(start) => ((start.u, rest(&problem).1), Some(start.held)),
+            Begin::At(snapshot) => {
+                (attempt, forcing, reached) = (snapshot.attempt, snapshot.forcing, snapshot.reached);
+                (steps, before, stood) = (snapshot.steps, snapshot.before, Some(snapshot.solver));
+                problem.committed = snapshot.committed;
+                ((snapshot.u, snapshot.lambda), snapshot.held)
+            }
+        };
+        Conditions { loads: problem.loads, rhs: problem.rhs } = path.conditions(attempt);
+        let (iterate, outcome) = first_iterate(&problem, &mut solver, (u, lambda), held, stood, timer);
+        let admissible = before < steps.len() || problem.is_admissible(&iterate.u);
+        Self { problem, solver, settings, path, attempt, iterate, admissible, forcing, outcome, reached, steps, before }
+    }
+
+    /// All that the rest depends on.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            attempt: self.attempt,
+            committed: self.problem.committed.clone(),
+            reached: self.reached.clone(),
+            steps: self.steps.clone(),
+            before: self.before,
+            u: self.iterate.u.clone(),
+            lambda: self.iterate.lambda.clone(),
+            held: None,
+            forcing: self.forcing,
+            solver: self.solver.state(),
+        }
+    }
+
+    /// The problem of the present attempt.
+    pub fn problem(&self) -> &TornProblem<'a> {
+        &self.problem
+    }
+
+    /// The present iterate.
+    pub fn iterate(&self) -> &Iterate {
+        &self.iterate
+    }
+
+    /// Where the present attempt leads.
+    pub fn at(&self) -> At {
+        self.path.at(self.attempt)
+    }
+
+    /// How the iteration of the present attempt ended; `None` while it goes on.
+    pub fn outcome(&self) -> Option<&Outcome> {
+        self.outcome.as_ref()
+    }
+
+    /// The last increment that was reached.
+    pub fn reached(&self) -> Option<&Reached> {
+        self.reached.as_ref()
+    }
+
+    /// All steps so far, those of failed attempts included, with the number of the increment.
+    pub fn steps(&self) -> &[(usize, StepRecord)] {
+        &self.steps
+    }
+
+    /// One step of the present attempt, whose outcome is not known yet. `None` if none could be taken, as
+    /// [`Newton::outcome`] explains then. `alive` is told the number of the step and the applications of F so far. Collective.
+    pub fn step(&mut self, timer: &Timer, alive: &dyn Fn(usize, usize)) -> Option<&StepRecord> {
+        let began = timer.total_seconds();
+        let mut refused = Vec::new();
+        let (step, damped) = loop {
+            match self.trial(refused.len(), timer, alive) {
+                Trial::Accepted(step, damped) => break (step, damped),
+                Trial::Refused(step) => refused.push(step),
+                Trial::Ended(outcome) => {
+                    self.end(outcome, timer);
+                    return None;
+                }
+            }
+        };
+        let (solved, length) = (step.outcome, damped.length);
+        let criterion = self.criterion(&damped, timer);
+        let left = self.move_to(&step, damped, timer);
+        let record = StepRecord {
+            number: self.steps.len() - self.before + 1,
+            criterion,
+            residual: self.iterate.residuals.largest(),
+            damping: length,
+            energy: self.iterate.state.energy,
+            plastic_elements: self.iterate.state.plastic,
+            active_contacts: self.problem.active_contacts(&self.iterate.lambda),
+            statistics: refused.iter().fold(step.statistics, |sum, trial: &Step| sum + trial.statistics),
+            local_residual: step.local_residual,
+            applications: step.applications + refused.iter().map(|trial| trial.applications).sum::<usize>(),
+            factorisations: step.factorisations + refused.iter().map(|trial| trial.factorisations).sum::<usize>(),
+            seconds: timer.total_seconds() - began,
+        };
+        self.steps.push((self.at().number, record));
+        match self.verdict(criterion, solved, timer) {
+            Some(outcome) => self.end(outcome, timer),
+            None => {
+                let Self { solver, problem, iterate, .. } = self;
+                timer.time("internal forces", || solver.follow(problem, (&left.0, &left.1), &iterate.u, length));
+            }
+        }
+        self.steps.last().map(|(_, record)| record)
+    }
+
+    /// Tries a step: solves the quadratic program of the tangents at the iterate, and looks for a length that lowers `J`.
+    fn trial(&mut self, refused: usize, timer: &Timer, alive: &dyn Fn(usize, usize)) -> Trial {
+        let Self { problem, solver, iterate, forcing, steps, .. } = self;
+        let own = &steps[self.before..];
+        // Where rounding spoiled the last step factors have to be in double precision.
+        if own.last().is_some_and(|(_, step)| step.local_residual > forcing::LOOSEST) {
+            solver.sharpen();
+        }
+        if problem.is_linear() && self.settings.accuracy.is_none() {
+            forcing.drop = solver.linear_drop();
+        }
+        let number = own.len() + 1;
+        let at = (&iterate.u, &iterate.state);
+        let step = match solver.solve(problem, at, *forcing, timer, &|applications| alive(number, applications)) {
+            Ok(step) => step,
+            Err(message) => return Trial::Ended(Outcome::Singular(message)),
+        };
+        // Perhaps the factors were not exact enough.
+        if step.outcome != qp::Outcome::Converged && solver.sharpen() {
+            return Trial::Refused(step);
+        }
+        match step.outcome {
+            qp::Outcome::Converged | qp::Outcome::LimitReached => {}
+            qp::Outcome::NotFinite => return Trial::Ended(Outcome::NotFinite),
+            outcome => return Trial::Ended(Outcome::Inner(outcome)),
+        }
+        // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
+        match damping::search(problem, at.0, at.1, &step.du, self.admissible, timer) {
+            Some(damped) => Trial::Accepted(step, damped),
+            None if !iterate.state.energy.is_finite() => Trial::Ended(Outcome::NotFinite),
+            None if refused >= TRIALS => Trial::Ended(Outcome::Stalled),
+            None => {
+                // Perhaps the program was solved too loosely for a descent direction.
+                forcing.tighten();
+                solver.sharpen();
+                Trial::Refused(step)
+            }
+        }
+    }
+
+    /// The paper's stopping criterion `|u+ - u|_e / (|u+|_e + |u|_e)`.
+    fn criterion(&self, next: &Damped, timer: &Timer) -> f64 {
+        timer.time("residuals", || self.problem.relative_change(&self.iterate.u, &next.u, &next.state.terms))
+    }
+
+    /// Takes the step; returns the displacement that it left, and the problem there.
+    fn move_to(&mut self, step: &Step, next: Damped, timer: &Timer) -> (Torn, State) {
+        let Self { problem, iterate, .. } = self;
+        let left = (replace(&mut iterate.u, next.u), replace(&mut iterate.state, next.state));
+        iterate.lambda.clone_from(&step.lambda);
+        self.admissible = true;
+        let before = iterate.residuals.largest();
+        let residuals = || problem.residuals(&iterate.u, &iterate.state, &iterate.lambda);
+        iterate.residuals = timer.time("residuals", residuals);
+        self.forcing.update(before, iterate.residuals.largest(), self.settings.residual, step.at_floor);
+        left
+    }
+
+    /// Whether the iteration ends with the step just taken, whose quadratic program ended like this.
+    fn verdict(&mut self, criterion: f64, program: qp::Outcome, timer: &Timer) -> Option<Outcome> {
+        let Self { problem, solver, settings, iterate, .. } = self;
+        if !(criterion.is_finite() && iterate.state.energy.is_finite()) {
+            return Some(Outcome::NotFinite);
+        }
+        let is_close = criterion < settings.tolerance || problem.is_linear();
+        if is_close && iterate.residuals.largest() <= settings.residual {
+            return Some(Outcome::Converged);
+        }
+        if let Some(accuracy) = settings.accuracy {
+            let errors = solver.errors(problem, (&iterate.u, &iterate.state), &iterate.lambda, timer);
+            if errors.algebraic <= accuracy * errors.discretisation {
+                (iterate.errors, iterate.ended_by_accuracy) = (Some(errors), true);
+                return Some(Outcome::Converged);
+            }
+        }
+        if program == qp::Outcome::LimitReached {
+            return Some(Outcome::Inner(program));
+        }
+        (self.steps.len() - self.before >= settings.limit).then_some(Outcome::LimitReached)
+    }
+
+    /// Ends the iteration, and finds out how exact the iterate is.
+    fn end(&mut self, outcome: Outcome, timer: &Timer) {
+        let Self { problem, solver, iterate, .. } = self;
+        let has_moved = self.steps.len() > self.before;
+        if iterate.errors.is_none() && has_moved && iterate.state.energy.is_finite() {
+            iterate.errors = Some(solver.errors(problem, (&iterate.u, &iterate.state), &iterate.lambda, timer));
+        }
+        self.outcome = Some(outcome);
+    }
+
+    /// Goes on from the end of an iteration: commits what was reached and begins with the next increment, or begins with half
+    /// of what failed. Collective.
+    ///
+    /// # Panics
+    /// If the iteration has not ended.
+    pub fn advance(&mut self, timer: &Timer) -> Next {
+        let outcome = self.outcome.clone().expect("the iteration has ended");
+        let (attempt, next) = if outcome == Outcome::Converged {
+            self.problem.commit(&self.iterate.u, &self.iterate.state, &self.iterate.lambda);
+            self.reached = Some(Reached { u: self.iterate.u.clone(), lambda: self.iterate.lambda.clone() });
+            let Some(attempt) = self.path.next(self.attempt) else { return Next::End };
+            (attempt, Next::Increment)
+        } else {
+            let Some(attempt) = self.path.halved(self.attempt) else { return Next::End };
+            self.solver.forget();
+            (attempt, Next::Half(self.at(), outcome))
+        };
+        self.enter(attempt, timer);
+        next
+    }
+
+    /// Begins with an attempt, near the last increment that was reached.
+    fn enter(&mut self, attempt: Attempt, timer: &Timer) {
+        let Self { problem, solver, path, .. } = self;
+        Conditions { loads: problem.loads, rhs: problem.rhs } = path.conditions(attempt);
+        let lambda = vec![0.0; problem.gather.rows()];
+        let (u, held) = match &self.reached {
+            Some(reached) => (reached.u.clone(), Some(problem.active_rows(&reached.lambda))),
+            None => (problem.gather.zeros(), None),
+        };
+        let (iterate, outcome) = first_iterate(problem, solver, (u, lambda), held, None, timer);
+        self.admissible = problem.is_admissible(&iterate.u);
+        (self.attempt, self.iterate, self.outcome) = (attempt, iterate, outcome);
+        (self.forcing, self.before) = (Forcing::default(), self.steps.len());
+    }
+
+    /// The problem, with all that is committed, and the displacement at the end of the last increment that was reached; that of
+    /// the iterate if there is none.
+    pub fn finish(self) -> (TornProblem<'a>, Torn) {
+        (self.problem, self.reached.map_or(self.iterate.u, |reached| reached.u))
+    }
+}
+
+/// The first iterate of an attempt, and how the iteration ended if it cannot even begin. With a state of the solver, goes on
+/// from there; if rows are known to hold, with the multipliers that follow from them. Collective.
+fn first_iterate(
+    problem: &TornProblem,
+    solver: &mut StepSolver,
+    (u, mut lambda): (Torn, Vec<f64>),
+    held: Option<Vec<bool>>,
+    stood: Option<SolverState>,
+    timer: &Timer,
+) -> (Iterate, Option<Outcome>) {
+    let state = problem.evaluate(&u);
+    let refusal = match stood {
+        Some(stood) => solver.resume(problem, stood, &lambda, timer).err(),
+        None => {
+            solver.begin();
+            None
+        }
+    };
+    if let Some(held) = held {
+        lambda = solver.expect(problem, &state, held);
+    }
+    let residuals = problem.residuals(&u, &state, &lambda);
+    let iterate = Iterate { u, lambda, state, residuals, errors: None, ended_by_accuracy: false };
+    (iterate, refusal.map(Outcome::Singular))
+}

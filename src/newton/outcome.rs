@@ -1,0 +1,71 @@
+//! How an iteration ends, and what each of its steps did.
+
+use serde::{Deserialize, Serialize};
+
+use crate::qp;
+
+/// How the iteration for an increment ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// Both criteria are met, or the accuracy is.
+    Converged,
+    /// The allowed steps are used up.
+    LimitReached,
+    /// No step length along the Newton direction lowers the energy: round-off, or a quadratic program solved too loosely.
+    Stalled,
+    /// A quantity is NaN or infinite.
+    NotFinite,
+    /// The quadratic program of a step could not be solved.
+    Inner(qp::Outcome),
+    /// A tangent stiffness is singular beyond its rigid motions.
+    Singular(String),
+}
+
+impl Outcome {
+    /// What to tell the user, `None` if all is well.
+    pub fn message(&self) -> Option<String> {
+        Some(match self {
+            Self::Converged => return None,
+            Self::LimitReached => "Newton's method reached solver.newton_limit without convergence".into(),
+            Self::Stalled => {
+                "Newton's method stalled: no step lowers the energy; tighten solver.qp_tolerance, or accept the residuals"
+                    .into()
+            }
+            Self::NotFinite => "the solution is not finite (NaN or infinite): check loads, sizes and moduli".into(),
+            Self::Inner(qp::Outcome::LimitReached) => {
+                "a quadratic program reached solver.qp_limit without convergence".into()
+            }
+            Self::Inner(outcome) => format!("a quadratic program could not be solved ({outcome:?})"),
+            Self::Singular(message) => message.clone(),
+        })
+    }
+}
+
+/// What one step did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepRecord {
+    /// Number, from 1.
+    pub number: usize,
+    /// The paper's criterion.
+    pub criterion: f64,
+    /// Largest of the true residuals.
+    pub residual: f64,
+    /// Step length, 1 for a full step.
+    pub damping: f64,
+    /// `J` after the step.
+    pub energy: f64,
+    /// Elements that yield.
+    pub plastic_elements: usize,
+    /// Contact pairs with a force.
+    pub active_contacts: usize,
+    /// What the QP solver did.
+    pub statistics: qp::Statistics,
+    /// Residual of the subdomains' problems that rounding leaves, relative to their forces.
+    pub local_residual: f64,
+    /// Applications of F, those around the quadratic program included.
+    pub applications: usize,
+    /// Subdomains with a new factor, over all ranks.
+    pub factorisations: usize,
+    /// Wall time.
+    pub seconds: f64,
+}

@@ -1,0 +1,43 @@
+//! Where a history of loads stands between two Newton steps: all that the rest of it depends on, beside the problem.
+
+use super::committed::Committed;
+use super::forcing::Forcing;
+use super::outcome::StepRecord;
+use super::path::Attempt;
+use super::step::SolverState;
+use crate::feti::Torn;
+
+/// The state of a [`super::Newton`], which goes on from it to the same bits.
+#[derive(Clone)]
+pub struct Snapshot {
+    /// The attempt that is under way.
+    pub attempt: Attempt,
+    /// What is committed.
+    pub committed: Committed,
+    /// The last increment that was reached.
+    pub reached: Option<Reached>,
+    /// All Newton steps so far, with the number of the increment.
+    pub steps: Vec<(usize, StepRecord)>,
+    /// How many of them belong to attempts before this one.
+    pub before: usize,
+    /// Torn displacement of the iterate.
+    pub u: Torn,
+    /// Its multipliers, of this rank's rows.
+    pub lambda: Vec<f64>,
+    /// The rows that hold at the iterate. It is told where bodies have been cut otherwise: multipliers and factors belonged to
+    /// subdomains that are gone, and are made anew from `u` and these rows.
+    pub held: Option<Vec<bool>>,
+    /// How exactly the next quadratic program is solved.
+    pub forcing: Forcing,
+    /// What the solver of the steps keeps.
+    pub solver: SolverState,
+}
+
+/// The end of an increment.
+#[derive(Clone)]
+pub struct Reached {
+    /// Torn displacement.
+    pub u: Torn,
+    /// Multipliers of this rank's rows.
+    pub lambda: Vec<f64>,
+}

@@ -1,0 +1,117 @@
+//! The solver of a scene's Newton steps: FETI set up on the subdomains of a rank, as the scene's settings want it.
+
+use crate::comm::Comm;
+use crate::decomposition::Subdomain;
+use crate::decomposition::sums::NodeSums;
+use crate::decomposition::twins::{alike, twins};
+use crate::feti::coarse::Coarse;
+use crate::feti::coarse::projector::Projector;
+use crate::feti::dual::gather::Gather;
+use crate::feti::dual::operator::DualOperator;
+use crate::feti::dual::space::RowSpace;
+use crate::feti::dual::supported;
+use crate::feti::inverse::factor::{Factors, analyse};
+use crate::feti::inverse::hybrid::Hybrid;
+use crate::feti::inverse::kernel::{self, RigidModes};
+use crate::feti::inverse::schur::Schur;
+use crate::feti::preconditioner::Preconditioner;
+use crate::feti::preconditioner::deluxe::Deluxe;
+use crate::model::stages::Stage;
+use crate::model::{self, Discrete, ModelError};
+use crate::monitor::timing::Timer;
+use crate::newton::{Method, ProgramSettings, Settings, StepSolver};
+use crate::qp::mprgp::Expansion;
+use crate::scene::{self, Scene};
+use crate::sparse::cholesky::Precision;
+
+/// What the torn problem and its solver share.
+pub(super) struct SetUp<'a> {
+    /// B.
+    pub gather: Gather<'a>,
+    /// Inner products of multipliers.
+    pub space: RowSpace<'a>,
+    /// Sums around nodes.
+    pub sums: NodeSums<'a>,
+    /// R, of each own subdomain's cluster.
+    pub modes: Vec<RigidModes>,
+}
+
+impl<'a> SetUp<'a> {
+    /// For a discrete problem, with its coarse problem. Collective.
+    pub fn new(discrete: &'a Discrete, comm: &'a dyn Comm, timer: &Timer) -> (Self, Coarse<'a>) {
+        let Discrete { decomposition, constraints, .. } = discrete;
+        let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains[..]);
+        let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(Subdomain::dofs).collect());
+        let space = RowSpace::new(comm, shares, constraints);
+        let sums = NodeSums::new(comm, decomposition);
+        let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
+        let coarse = || Coarse::new(comm, &decomposition.clusters, subdomains, &modes, constraints, &gather);
+        let coarse = timer.time("coarse set-up", coarse);
+        (Self { gather, space, sums, modes }, coarse)
+    }
+}
+
+/// The solver, before anything is factorised but the coarse problem. Collective.
+///
+/// # Errors
+/// If supports, contacts and loads do not hold all bodies.
+pub(super) fn step_solver<'a>(
+    scene: &Scene,
+    discrete: &'a Discrete,
+    comm: &'a dyn Comm,
+    set_up: &'a SetUp,
+    (mut coarse, stages): (Coarse<'a>, &[Stage]),
+    timer: &Timer,
+) -> Result<StepSolver<'a>, ModelError> {
+    let Discrete { decomposition, constraints, .. } = discrete;
+    let SetUp { gather, space, modes, .. } = set_up;
+    let (subdomains, clusters) = (&decomposition.subdomains[..], &decomposition.clusters);
+    let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
+    let precision = match scene.solver.precision {
+        scene::Precision::Mixed => Precision::Single,
+        scene::Precision::Double => Precision::Double,
+    };
+    let schur = |precision| {
+        let boundaries = gather.boundaries();
+        let alike = alike(comm, subdomains, &boundaries);
+        timer.time("symbolic analysis", || Schur::new(&symbolic, boundaries, &alike, precision))
+    };
+    let schur = match scene.solver.preconditioner {
+        scene::Preconditioner::None => None,
+        scene::Preconditioner::Lumped => Some(schur(None)),
+        scene::Preconditioner::Dirichlet => Some(schur(Some(precision))),
+    };
+    let preconditioner = schur.map(|schur| {
+        let deluxe = Deluxe::new(comm, &decomposition.shares, constraints, gather, &schur);
+        Preconditioner::new(gather, schur, deluxe)
+    });
+    timer.time("coarse set-up", || model::held::at_all_stages(scene, discrete, &mut coarse, space, modes, stages))?;
+    let hybrid = (!clusters.are_single())
+        .then(|| timer.time("clusters", || Hybrid::new(clusters.of_rank(comm.rank()), subdomains)));
+    let operator = DualOperator::new(Factors::new(symbolic, precision), hybrid, gather);
+    let supported = supported::unknowns(constraints, gather, subdomains, modes);
+    let twins = twins(comm, subdomains);
+    Ok(StepSolver::new(operator, Projector { coarse }, preconditioner, programs(scene), twins, supported))
+}
+
+/// How the quadratic programs are solved.
+fn programs(scene: &Scene) -> ProgramSettings {
+    let solver = &scene.solver;
+    let method = match (solver.qp, solver.expansion) {
+        (scene::Qp::ActiveSet, _) => Method::ActiveSet,
+        (scene::Qp::SmalseM, scene::Expansion::ProjectedCg) => Method::Smalse(Expansion::ProjectedCg),
+        (scene::Qp::SmalseM, scene::Expansion::Fixed) => Method::Smalse(Expansion::Fixed),
+    };
+    ProgramSettings { method, tolerance: solver.qp_tolerance, products: solver.qp_limit }
+}
+
+/// When Newton's method stops.
+pub(super) fn settings(scene: &Scene) -> Settings {
+    let solver = &scene.solver;
+    Settings {
+        tolerance: solver.newton_tolerance,
+        residual: solver.residual_tolerance,
+        limit: solver.newton_limit,
+        accuracy: solver.accuracy,
+    }
+}
