@@ -16,7 +16,7 @@ class Group:
         self.summaries = [record["summary"] for record in self.records]
         self.first = self.summaries[0]
         # Whether times mean something: not where the machine was busy with other work.
-        self.timed = all(record["provenance"].get("quiet", True) for record in self.records)
+        self.timed = all(record["provenance"]["quiet"] for record in self.records)
 
     def count(self, key):
         """A number that must not differ between repetitions."""
@@ -60,22 +60,20 @@ def thousands(value):
     return "" if value is None else f"{value:,}".replace(",", " ")
 
 
-def circumstances(groups):
-    """One line for each commit and machine that the tables draw from."""
+def circumstances(records, more=lambda records: ""):
+    """One line for each commit and machine that the tables draw from, with `more` of them behind the machine."""
     found = {}
-    for group in groups:
-        for record in group.records:
-            p = record["provenance"]
-            commit = p["commit"][:12] + (" (with uncommitted changes)" if p["dirty"] else "")
-            where = f"{p['cores']} cores of {p['cpu']}, {p['memory_mb'] / 1024:.0f} GiB, {p['rustc']}, {p['mpi']}"
-            found.setdefault((commit, where), []).append((p["date"], p["load_average"], p.get("stolen")))
+    for record in records:
+        p = record["provenance"]
+        commit = p["commit"][:12] + (" (with uncommitted changes)" if p["dirty"] else "")
+        where = f"{p['cores']} cores of {p['cpu']}, {p['memory_mb'] / 1024:.0f} GiB, {p['rustc']}, {p['mpi']}"
+        found.setdefault((commit, where), []).append(record)
     lines = []
-    for (commit, where), runs in sorted(found.items(), key=lambda item: max(run[0] for run in item[1])):
-        busiest = max(load for _, load, _ in runs)
-        first = min(date for date, _, _ in runs)[:10]
-        line = f"- commit {commit}, {first}, {len(runs)} runs on {where}; load average before a run at most {busiest:.1f}"
-        stolen = [share for _, _, share in runs if share is not None]
-        if stolen:
+    for (commit, where), runs in found.items():
+        dates, loads, shares = ([run["provenance"].get(key) for run in runs] for key in ("date", "load_average", "stolen"))
+        line = f"- commit {commit}, {min(dates)[:10]}, {len(runs)} runs on {where}{more(runs)}; "
+        line += f"load average before a run at most {max(loads):.1f}"
+        if stolen := [share for share in shares if share is not None]:
             line += f"; a hypervisor kept {100 * min(stolen):.1f} to {100 * max(stolen):.1f} % of the cores' time from a run"
-        lines.append(line + ".")
-    return "\n".join(lines) + "\n"
+        lines.append((max(dates), f"{line}.\n"))
+    return "".join(line for _, line in sorted(lines))

@@ -268,7 +268,6 @@ def predictions(groups, units, coarse, network):
         g.first["communication"]["collectives"]["calls"]
         / (g.first["hessian_multiplications"] + g.first["preconditioner_applications"])
         for g in groups
-        if "collectives" in g.first["communication"]
     )
 
     def at(subdomains, ranks):

@@ -4,49 +4,21 @@ import math
 
 WIDTH, HEIGHT = 760, 400
 LEFT, RIGHT, TOP, BOTTOM = 70, 210, 44, 56
+ACROSS, UP = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
 COLOURS = ["#555555", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999933"]
 
 
 def chart(title, x_label, y_label, x_values, series):
     """`series`: (name, {x: y}) in the order of the colours. The x values stand at equal distances."""
     top = nice_top(max(y for _, points in series for y in points.values()))
-    width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
 
     def at(x, y):
         share = x_values.index(x) / max(len(x_values) - 1, 1)
-        return LEFT + share * width, TOP + height * (1 - y / top)
+        return LEFT + share * ACROSS, TOP + UP * (1 - y / top)
 
-    parts = frame(title, x_label, y_label)
-    for step in range(6):
-        value = top * step / 5
-        _, y = at(x_values[0], value)
-        parts.append(f'<line x1="{LEFT}" x2="{LEFT + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
-        parts.append(text(LEFT - 8, y + 4, f"{value:.0f}", "end"))
-    for x in x_values:
-        parts.append(text(at(x, 0)[0], TOP + height + 20, str(x)))
-    labels = []
-    for (name, points), colour in zip(series, COLOURS):
-        places = [at(x, y) for x, y in points.items()]
-        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
-        parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2"/>')
-        parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{colour}"/>' for x, y in places]
-        labels.append([places[-1][1] + 4, places[-1][0] + 10, name, colour])
-    for label, below in zip(spread(labels), labels):
-        parts.append(text(below[1], label, below[2], "start", f'style="fill:{below[3]}"'))
-    return "\n".join([*parts, "</svg>", ""])
-
-
-def frame(title, x_label, y_label):
-    """The paper and what is written around the axes."""
-    width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
-    return [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
-        'font-family="sans-serif" font-size="13" fill="#222">',
-        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
-        text(LEFT, 24, title, "start", 'font-size="15"'),
-        text(LEFT + width / 2, HEIGHT - 12, x_label),
-        text(0, 0, y_label, "middle", f'transform="translate(16 {TOP + height / 2:.1f}) rotate(-90)"'),
-    ]
+    rules = [(at(x_values[0], top * step / 5)[1], f"{top * step / 5:.0f}") for step in range(6)]
+    marks = [(at(x, 0)[0], str(x)) for x in x_values]
+    return drawn(frame(title, x_label, y_label, rules, marks), [(*of, False) for of in series], at)
 
 
 def curves(title, x_label, y_label, series, y_top=None):
@@ -54,7 +26,6 @@ def curves(title, x_label, y_label, series, y_top=None):
     zero to there."""
     xs = sorted({x for _, points, _ in series for x in points})
     ys = [y for _, points, _ in series for y in points.values()]
-    width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
     x_ticks = xs if len(xs) <= 8 else decades(xs[0], xs[-1])
     y_ticks = [y_top * step / 5 for step in range(6)] if y_top else ticks(min(ys), max(ys))
     low, high = (0.0, y_top) if y_top else (math.log(min(y_ticks[0], *ys)), math.log(max(y_ticks[-1], *ys)))
@@ -63,15 +34,52 @@ def curves(title, x_label, y_label, series, y_top=None):
     def at(x, y):
         along = (math.log(x) - left) / (right - left or 1)
         up = ((y if y_top else math.log(y)) - low) / (high - low or 1)
-        return LEFT + along * width, TOP + height * (1 - up)
+        return LEFT + along * ACROSS, TOP + UP * (1 - up)
 
-    parts = frame(title, x_label, y_label)
-    for value in y_ticks:
-        _, y = at(xs[0], value)
-        parts.append(f'<line x1="{LEFT}" x2="{LEFT + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
-        parts.append(text(LEFT - 8, y + 4, number(value), "end"))
-    for x in x_ticks:
-        parts.append(text(at(x, y_ticks[-1])[0], TOP + height + 20, number(x)))
+    rules = [(at(xs[0], value)[1], number(value)) for value in y_ticks]
+    marks = [(at(x, y_ticks[-1])[0], number(x)) for x in x_ticks]
+    return drawn(frame(title, x_label, y_label, rules, marks), series, at)
+
+
+def bars(title, x_label, y_label, columns):
+    """Stacked bars. `columns`: (name, {part: height}); all have the same parts, the first lies at the bottom."""
+    top = nice_top(1000 * max(sum(column.values()) for _, column in columns)) / 1000
+    share = ACROSS / len(columns)
+    rules = [(TOP + UP * (1 - step / 5), number(top * step / 5)) for step in range(6)]
+    marks = [(LEFT + (place + 0.5) * share, name) for place, (name, _) in enumerate(columns)]
+    parts, thick = frame(title, x_label, y_label, rules, marks), min(0.7 * share, 60)
+    for (x, _), (_, column) in zip(marks, columns):
+        done = 0.0
+        for value, colour in zip(column.values(), COLOURS):
+            tall = UP * value / top
+            y = TOP + UP * (1 - done / top) - tall
+            parts.append(f'<rect x="{x - thick / 2:.1f}" y="{y:.1f}" width="{thick:.1f}" height="{tall:.1f}" fill="{colour}"/>')
+            done += value
+    for place, (name, colour) in enumerate(zip(columns[0][1], COLOURS)):
+        y = TOP + UP - 20 * place
+        parts.append(f'<rect x="{LEFT + ACROSS + 12}" y="{y - 11:.1f}" width="12" height="12" fill="{colour}"/>')
+        parts.append(text(LEFT + ACROSS + 30, y, name, "start"))
+    return ended(parts)
+
+
+def frame(title, x_label, y_label, rules, marks):
+    """The paper, what is written around the axes, rules at heights and marks at places along x, with their words."""
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
+        'font-family="sans-serif" font-size="13" fill="#222">',
+        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
+        text(LEFT, 24, title, "start", 'font-size="15"'),
+        text(LEFT + ACROSS / 2, HEIGHT - 12, x_label),
+        text(0, 0, y_label, "middle", f'transform="translate(16 {TOP + UP / 2:.1f}) rotate(-90)"'),
+    ]
+    for y, word in rules:
+        parts.append(f'<line x1="{LEFT}" x2="{LEFT + ACROSS}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
+        parts.append(text(LEFT - 8, y + 4, word, "end"))
+    return parts + [text(x, TOP + UP + 20, word) for x, word in marks]
+
+
+def drawn(parts, series, at):
+    """With the lines of the series, their points at the places that `at` gives, and their names."""
     labels = []
     for (name, points, dashed), colour in zip(series, COLOURS):
         places = [at(x, y) for x, y in sorted(points.items())]
@@ -83,32 +91,10 @@ def curves(title, x_label, y_label, series, y_top=None):
         labels.append([places[-1][1] + 4, places[-1][0] + 10, name, colour])
     for label, below in zip(spread(labels), labels):
         parts.append(text(below[1], label, below[2], "start", f'style="fill:{below[3]}"'))
-    return "\n".join([*parts, "</svg>", ""])
+    return ended(parts)
 
 
-def bars(title, x_label, y_label, columns):
-    """Stacked bars. `columns`: (name, {part: height}); all have the same parts, the first lies at the bottom."""
-    top = nice_top(1000 * max(sum(column.values()) for _, column in columns)) / 1000
-    width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
-    parts = frame(title, x_label, y_label)
-    for step in range(6):
-        y = TOP + height * (1 - step / 5)
-        parts.append(f'<line x1="{LEFT}" x2="{LEFT + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
-        parts.append(text(LEFT - 8, y + 4, number(top * step / 5), "end"))
-    share = width / len(columns)
-    for place, (name, column) in enumerate(columns):
-        x, done = LEFT + (place + 0.5) * share, 0.0
-        thick = min(0.7 * share, 60)
-        parts.append(text(x, TOP + height + 20, name))
-        for value, colour in zip(column.values(), COLOURS):
-            tall = height * value / top
-            y = TOP + height * (1 - done / top) - tall
-            parts.append(f'<rect x="{x - thick / 2:.1f}" y="{y:.1f}" width="{thick:.1f}" height="{tall:.1f}" fill="{colour}"/>')
-            done += value
-    for place, (name, colour) in enumerate(zip(columns[0][1], COLOURS)):
-        y = TOP + height - 20 * place
-        parts.append(f'<rect x="{LEFT + width + 12}" y="{y - 11:.1f}" width="12" height="12" fill="{colour}"/>')
-        parts.append(text(LEFT + width + 30, y, name, "start"))
+def ended(parts):
     return "\n".join([*parts, "</svg>", ""])
 
 

@@ -183,7 +183,7 @@ def gigabytes(summary):
 
 
 def quiet(record):
-    return record["provenance"].get("quiet", True)
+    return record["provenance"]["quiet"]
 
 
 COSTS = {

@@ -213,18 +213,11 @@ WITH = {"factorisation of the interior": "factorisation", "symbolic analysis": "
 WITH |= {"coarse set-up": "coarse problem"}
 
 
-def memory_of_a_rank(summary):
-    """Of the one that takes most; the mean in earlier runs."""
-    return summary.get("peak_rss_mb_max", summary["peak_rss_mb"] / summary["ranks"])
-
-
 def phases(group):
     """Seconds of the run of median time by part; phases are on their slowest rank, what is left is other."""
     summary = group.summaries[(len(group.summaries) - 1) // 2]
     found = dict.fromkeys(PARTS, 0.0)
-    if "imbalance" in summary:
-        # Earlier runs counted messages as part of the phases.
-        found["messages"] = sum(row["seconds"] for row in summary["communication"].values())
+    found["messages"] = sum(row["seconds"] for row in summary["communication"].values())
     for phase, seconds in summary["time"].items():
         part = WITH.get(phase, phase)
         if part in found:
@@ -250,7 +243,7 @@ def plots(folder, studies, of_levels):
         title = f"Time per phase, on its slowest rank{note}"
         found["scaling-phases.svg"] = plot.bars(title, "study on ranks", "seconds", columns)
     memory = [
-        (study.short(), {p: memory_of_a_rank(study.groups[p].first) for p in study.ranks}, False) for study in studies
+        (study.short(), {p: study.groups[p].first["peak_rss_mb_max"] for p in study.ranks}, False) for study in studies
     ]
     if memory:
         found["scaling-memory.svg"] = plot.curves("Memory of a rank", "ranks", "MiB", memory)
@@ -284,6 +277,6 @@ def pages(folder=RESULTS, raw=RAW):
     if of_levels:
         text += ["## Numerical\n", numerical_table(of_levels)]
     text += [f"![{path.stem}]({path.name})\n" for path in found]
-    text += ["## Where the runs come from\n", circumstances(groups.values())]
+    text += ["## Where the runs come from\n", circumstances(record for group in groups.values() for record in group.records)]
     return found | {folder / "scaling.md": "\n".join(text)}
 

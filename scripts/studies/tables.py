@@ -1,8 +1,8 @@
 """The paper's Tables 1 and 2, beside the paper's numbers and independent references.
 
 All levels of SMALSE-M without a preconditioner take hours. What has not been measured stays blank on the page; its short form also
-goes to the marked part of the README. With --out, runs and one table go to a folder of their own: for a cluster, see jobs/table1
-and jobs/table2.
+goes between `<!-- measured: -->` and `<!-- /measured -->` in the README and in docs. With --out, runs and one table go to a folder
+of their own: for a cluster, see jobs/table1 and jobs/table2.
 """
 
 import itertools
@@ -17,7 +17,7 @@ from .measure import RESULTS, ROOT, Run
 from .pages import table
 
 RAW = measure.RAW / "tables"
-README_PART = re.compile(r"(<!-- measured:.*?-->\n).*?(<!-- /measured -->)", re.DOTALL)
+MARKED = re.compile(r"(<!-- measured:.*?-->\n).*?(<!-- /measured -->)", re.DOTALL)
 
 
 class Variant:
@@ -46,13 +46,16 @@ VARIANTS = [
 
 NAMES = [variant.name for variant in VARIANTS]
 
+PAPER = json.loads((RESULTS / "paper.json").read_text())
+REFERENCES = json.loads((RESULTS / "reference.json").read_text())["levels"]
+
 RANKS = 2
 """Ranks of Table 2, the numerical scalability."""
 
 TABLE_1 = [("smalse-m/none", 2, [1, 2]), ("active-set/dirichlet", 3, [1, 2])]
 """Variant, level and ranks of Table 1, the parallel scalability."""
 
-READ = ("time", "work", "communication", "newton", "cascade", "warnings")
+READ = ("time", "work", "communication", "newton", "cascade")
 READ += ("contacts", "contact_force", "contact_forces", "reactions")
 """Tables of the summary that the page reads, or compares between numbers of ranks."""
 
@@ -210,8 +213,8 @@ def cost_table(groups, paper):
         return 1e9 * summary["time"]["dual operator"] * summary["ranks"] / products
 
     def read_by_product(summary):
-        """Of the factors, in bytes for each unknown: elastic subdomains of one shape share theirs. Early runs do not say."""
-        if summary["cascade"] or "work" not in summary:
+        """Of the factors, in bytes for each unknown: elastic subdomains of one shape share theirs."""
+        if summary["cascade"]:
             return ""
         products = summary["hessian_multiplications"] * summary["primal_dofs"]
         return measured(summary["work"]["dual operator"]["bytes"] / products)
@@ -358,12 +361,12 @@ def growth(levels):
     return table(["level", *levels.numbers], rows)
 
 
-def accuracy(levels, references):
+def accuracy(levels):
     """How right the solutions are, at all levels."""
 
     def difference(key, value):
         def of_group(group):
-            expected = references.get(str(group.first["level"]), {}).get(key)
+            expected = REFERENCES.get(str(group.first["level"]), {}).get(key)
             return "" if expected is None else f"{abs(value(group.first) / expected - 1):.1e}"
 
         return of_group
@@ -377,10 +380,9 @@ def accuracy(levels, references):
 
 def profile(levels):
     """Where the time goes: phases of the default at the highest level, each against the machine's limits."""
-    # Earlier runs counted messages as part of the phases.
-    apart = {n: {v: g for v, g in groups.items() if g.timed and "imbalance" in g.first} for n, groups in levels.levels.items()}
-    level = max(n for n, groups in apart.items() if groups)
-    candidates = apart[level]
+    timed = {n: {v: g for v, g in groups.items() if g.timed} for n, groups in levels.levels.items()}
+    level = max(n for n, groups in timed.items() if groups)
+    candidates = timed[level]
     variant, group = DEFAULT, candidates.get(DEFAULT)
     if group is None:
         variant, group = min(candidates.items(), key=lambda item: item[1].median())
@@ -390,7 +392,7 @@ def profile(levels):
     flops, read = ranks * limits["gemm_single_gflops"], ranks * limits["read_gb_per_s"]
 
     def against(name, seconds):
-        work = summary.get("work", {}).get(name, {})
+        work = summary["work"].get(name, {})
         done = [(work.get("flops", 0), flops, "GF/s"), (work.get("bytes", 0), read, "GB/s")]
         rates = [(amount / seconds / 1e9, limit, unit) for amount, limit, unit in done if amount]
         return ", ".join(f"{rate:.3g} of {limit:.3g} {unit} ({100 * rate / limit:.0f} %)" for rate, limit, unit in rates)
@@ -418,7 +420,7 @@ def next_half(summary, flops, read):
         return sum(summary["time"].get(name, 0) for name in names)
 
     def least(names):
-        work = [summary.get("work", {}).get(name, {}) for name in names]
+        work = [summary["work"].get(name, {}) for name in names]
         return sum(max(w.get("flops", 0) / flops, w.get("bytes", 0) / read) / 1e9 for w in work)
 
     total, apply, factorise = summary["time_total"], taken(applying), taken(factorising)
@@ -429,8 +431,9 @@ def next_half(summary, flops, read):
     return NEXT_HALF.format(**{name: f"{value:.3g}" for name, value in numbers.items()})
 
 
-def table_1(groups, study, paper):
+def table_1(groups, study):
     """Parallel scalability: the same problem on more and more ranks."""
+    paper = PAPER["table1"]
     head = ["", "ranks", "Newton steps", "outer QP iterations", "multiplications by F", "last Newton step [s]"]
     head += ["total time [s]", "speed-up", "memory [MiB]"]
     rows = [
@@ -455,8 +458,8 @@ def table_1(groups, study, paper):
     return table(head, rows) + "\n" + " ".join(equal) + "\n"
 
 
-DEPENDS_ON_RANKS = {"ranks", "warnings", "time", "work", "communication", "time_total", "peak_rss_mb", "memory_estimate_mb"}
-DEPENDS_ON_RANKS |= {"newton", "cascade", "provenance", "imbalance", "peak_rss_mb_max"}
+DEPENDS_ON_RANKS = {"ranks", "time", "work", "communication", "time_total", "peak_rss_mb", "memory_estimate_mb"}
+DEPENDS_ON_RANKS |= {"newton", "cascade", "imbalance", "peak_rss_mb_max"}
 
 
 def equality(variant, level, summaries):
@@ -476,39 +479,50 @@ def used():
     return [record for group in read(RAW).values() for record in group.records]
 
 
-def pages():
-    paper = json.loads((RESULTS / "paper.json").read_text())
-    references = json.loads((RESULTS / "reference.json").read_text())["levels"]
-    groups = read(RAW)
-    levels = {}
+def by_level(groups, ranks):
+    """Groups by level, then by variant."""
+    found = {}
     for level, variant, on in sorted(groups, key=lambda kind: (kind[0], NAMES.index(kind[1]))):
-        if on == RANKS:
-            levels.setdefault(level, {})[variant] = groups[level, variant, on]
+        if on == ranks:
+            found.setdefault(level, {})[variant] = groups[level, variant, on]
+    return found
 
-    all_levels = Levels(levels, paper["table2"])
+
+def table_2(levels, heading):
+    """Numerical scalability: what each level costs, and what comes out."""
+    for level, groups in levels.items():
+        yield f"## {heading} {level}\n"
+        yield cost_table(groups, PAPER["table2"].get(str(level), {}))
+        yield result_table(groups, REFERENCES.get(str(level), {}))
+
+
+def pages():
+    groups = read(RAW)
+    levels = by_level(groups, RANKS)
+    all_levels = Levels(levels, PAPER["table2"])
     short = scalability(all_levels, RANKS)
     text = [HEAD, "## Table 2 in short\n", short, "![Multiplications by F against subdomains](scalability.svg)\n"]
     text += [f"## Growth, level {GROWTH_FROM} = 1\n", growth(all_levels)]
     if levels:
         text += ["## Accuracy: residuals, and relative difference from independent programs\n"]
-        text += [accuracy(all_levels, references), "## Where the time goes\n", profile(all_levels)]
-    for level, of_level in levels.items():
-        text += [f"## Table 2, level {level}\n", cost_table(of_level, paper["table2"].get(str(level), {}))]
-        text += [result_table(of_level, references.get(str(level), {}))]
-    text += ["## Table 1: one problem on more ranks\n", table_1(groups, TABLE_1, paper["table1"])]
-    text += ["## Where the runs come from\n", circumstances(groups.values())]
+        text += [accuracy(all_levels), "## Where the time goes\n", profile(all_levels)]
+    text += table_2(levels, "Table 2, level")
+    text += ["## Table 1: one problem on more ranks\n", table_1(groups, TABLE_1)]
+    text += ["## Where the runs come from\n", circumstances(used())]
 
     by_variant = {}
     for of_level in levels.values():
         for variant, group in of_level.items():
             by_variant.setdefault(variant, {})[group.first["subdomains"]] = group.count("hessian_multiplications")
-    of_paper = {row["subdomains"]: row["hessian_multiplications"] for row in paper["table2"].values()}
+    of_paper = {row["subdomains"]: row["hessian_multiplications"] for row in PAPER["table2"].values()}
     series = [("paper", of_paper), *by_variant.items()]
     x_values = sorted({x for _, points in series for x in points})
     chart = plot.chart("Multiplications by F, all Newton steps", "subdomains", "multiplications", x_values, series)
 
-    readme = README_PART.sub(lambda part: f"{part[1]}{short}{part[2]}", (ROOT / "README.md").read_text(), count=1)
-    return {RESULTS / "tables.md": "\n".join(text), RESULTS / "scalability.svg": chart, ROOT / "README.md": readme}
+    files = {RESULTS / "tables.md": "\n".join(text), RESULTS / "scalability.svg": chart}
+    for file in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+        files[file] = MARKED.sub(lambda part: f"{part[1]}{short}{part[2]}", file.read_text())
+    return files
 
 
 def table_of(number, folder, variants, levels, ranks):
@@ -516,17 +530,9 @@ def table_of(number, folder, variants, levels, ranks):
     groups = read(folder, variants)
     if not groups:
         sys.exit(f"scripts/bench: no run of {folder} succeeded")
-    paper = json.loads((RESULTS / "paper.json").read_text())
     if number == 1:
-        study = [(variant, level, ranks) for variant in variants for level in levels]
-        tables = [table_1(groups, study, paper["table1"])]
+        tables = [table_1(groups, [(variant, level, ranks) for variant in variants for level in levels])]
     else:
-        references = json.loads((RESULTS / "reference.json").read_text())["levels"]
-        tables = []
-        for level in levels:
-            of_level = {v: groups[level, v, ranks[-1]] for v in variants if (level, v, ranks[-1]) in groups}
-            if of_level:
-                tables += [f"## Level {level}\n", cost_table(of_level, paper["table2"].get(str(level), {}))]
-                tables += [result_table(of_level, references.get(str(level), {}))]
-    return "\n".join([f"# Table {number}\n", *tables, "## Where the runs come from\n", circumstances(groups.values())])
-
+        tables = table_2(by_level(groups, ranks[-1]), "Level")
+    records = (record for group in groups.values() for record in group.records)
+    return "\n".join([f"# Table {number}\n", *tables, "## Where the runs come from\n", circumstances(records)])

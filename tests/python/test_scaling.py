@@ -20,7 +20,7 @@ def record(level, width, ranks):
         "subdomains": subdomains, "primal_dofs": 4000 * subdomains, "dual_dofs": 700 * subdomains, "ranks": ranks,
         "newton_iterations": 7, "hessian_multiplications": 60 + 10 * level, "preconditioner_applications": 40 + 10 * level,
         "active_set_iterations": 20, "peak_rss_mb": 100.0 * ranks, "cascade": [],
-        "communication": {"collectives": {"calls": 500}},
+        "communication": {"collectives": {"calls": 500, "seconds": 0.0}}, "peak_rss_mb_max": 100.0,
         "work": {
             "factorisation": {"flops": 2e9 * subdomains}, "factorisation of the interior": {"flops": 1e9 * subdomains},
             "dual operator": {"bytes": 5e8 * subdomains}, "preconditioner": {"bytes": 3e8 * subdomains},

@@ -16,6 +16,7 @@ import tempfile
 import time
 
 from .. import measure
+from ..groups import circumstances
 from ..measure import RESULTS
 from ..pages import table
 
@@ -250,26 +251,11 @@ def level_table(level, found, reference):
     return table(head, rows)
 
 
-def circumstances(found):
-    lines = {}
-    for records, _ in found.values():
-        for record in records:
-            p = record["provenance"]
-            commit = p["commit"][:12] + (" (with uncommitted changes)" if p["dirty"] else "")
-            where = f"{p['cores']} cores of {p['cpu']}, {p['memory_mb'] / 1024:.0f} GiB, {p['mpi']}"
-            lines.setdefault((commit, where), []).append(record)
-    text = []
-    for (commit, where), records in sorted(lines.items(), key=lambda item: min(r["provenance"]["date"] for r in item[1])):
-        dates = sorted(r["provenance"]["date"] for r in records)
-        busiest = max(r["provenance"]["load_average"] for r in records)
-        summaries = [r["summary"] for r in records if r["summary"]]
-        versions = {f"PETSc {s['petsc']}" for s in summaries if "petsc" in s}
-        versions |= {f"CalculiX {s['calculix']}" for s in summaries if "calculix" in s}
-        text.append(
-            f"- commit {commit}, {dates[0][:10]}, {len(records)} runs on {where}; {', '.join(sorted(versions)) or 'no peers'}; "
-            f"load average before a run at most {busiest:.1f}."
-        )
-    return "\n".join(text) + "\n"
+def versions(records):
+    """Of the peers, as they say themselves."""
+    summaries = [record["summary"] for record in records if record["summary"]]
+    found = {f"{name} {s[key]}" for name, key in (("PETSc", "petsc"), ("CalculiX", "calculix")) for s in summaries if key in s}
+    return f"; {', '.join(sorted(found)) or 'no peers'}"
 
 
 def used():
@@ -282,5 +268,5 @@ def pages():
     text = [HEAD]
     for level in sorted({level for level, _ in found}):
         text += [f"## Level {level}\n", level_table(level, found, references.get(str(level), {}))]
-    text += ["## Where the runs come from\n", circumstances(found)]
+    text += ["## Where the runs come from\n", circumstances((record for records, _ in found.values() for record in records), versions)]
     return {RESULTS / "peers.md": "\n".join(text)}
