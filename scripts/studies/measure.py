@@ -6,6 +6,7 @@ import os
 import pathlib
 import platform
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -35,6 +36,8 @@ class Run(typing.NamedTuple):
     options: list
     """Of `fetiplast solve`, the scene first."""
     ranks: int
+    start: list | None = None
+    """How the command begins where it is another program's, which takes --out DIR and leaves DIR/summary.json."""
 
 
 class Program:
@@ -97,21 +100,21 @@ def kept(folder, used):
     return {file: text(file) or None for file in folder.glob("*.jsonl")}
 
 
-def run(runs, arguments, folder, tables=()):
+def run(runs, arguments, folder, tables=(), program=None, limit=None):
     """All runs, the whole list as often as is asked for, so that a slow spell does not hit one kind only. Their records go to
-    a new file in the folder; the number of runs that failed is returned. `tables`: see `shortened`."""
+    a new file in the folder; the number of runs that failed is returned. `tables`: see `shortened`; `limit`: see `ended`."""
     if not runs:
         sys.exit("scripts/bench: nothing to measure with these options")
-    program = Program(arguments)
+    program = program or Program(arguments)
     records, failed = program.records(folder), 0
     for repetition in range(1, arguments.repeat + 1):
         for run in runs:
-            record = {**run.label, **solve(program, run, folder)}
+            record = {**run.label, **solve(program, run, folder, limit)}
             record["repetition"] = repetition
             record["provenance"] |= program.provenance(record["summary"])
             record["summary"] = shortened(record["summary"], tables)
             records.add(record)
-            failed += record["exit_code"] != 0
+            failed += record["exit_code"] not in (0, None)
             print(told(run.label, record), flush=True)
     return failed
 
@@ -130,26 +133,27 @@ def date(time):
     return f"{time:%Y-%m-%dT%H:%M:%SZ}"
 
 
-def solve(program, run, folder):
+def solve(program, run, folder, limit):
     """One run, without its label."""
-    options = [*run.options, "--progress", "off"]
+    command = [*(run.start or [*program.on(run.ranks), "solve"]), *run.options]
     started, load = now(), os.getloadavg()[0]
     with tempfile.TemporaryDirectory(dir=folder if program.shared else None) as out:
         summary = pathlib.Path(out) / "summary.json"
-        command = [*program.on(run.ranks), "solve", *options, "--out", out, "--summary", str(summary)]
+        more = [] if run.start else ["--progress", "off", "--summary", str(summary)]
         watch, before = time.monotonic(), processor_time()
-        done = subprocess.run(command, env=program.environment, capture_output=True, text=True)
+        code, said = ended([*command, *more, "--out", out], program.environment, limit)
         seconds = time.monotonic() - watch
         taken, passed = (after - earlier for after, earlier in zip(processor_time(), before))
-        found = read_summary(summary)
-    if done.returncode:
-        print(done.stdout + done.stderr, file=sys.stderr)
+        found = json.loads(summary.read_text()) if summary.exists() else None
+    if code:
+        print(said, file=sys.stderr)
     return {
-        "exit_code": done.returncode,
+        "exit_code": code,
         "seconds": seconds,
         "summary": found,
         "provenance": {
-            "command": shlex.join([*program.on(run.ranks, "fetiplast"), "solve", *options]),
+            # Paths are those of one machine.
+            "command": shlex.join(pathlib.Path(word).name if word.startswith("/") else word for word in command),
             "date": date(started),
             "load_average": load,
             "stolen": taken / passed if passed else 0.0,
@@ -157,9 +161,22 @@ def solve(program, run, folder):
     }
 
 
-def read_summary(file):
-    """The summary of a run, nothing if it wrote none."""
-    return json.loads(file.read_text()) if file.exists() else None
+def ended(command, environment, limit):
+    """The exit code of a command and what it said. The code is None where it and all its processes had to be ended after `limit`
+    seconds."""
+    apart = limit is not None
+    process = subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=apart
+    )
+    try:
+        said, _ = process.communicate(timeout=limit)
+        return process.returncode, said
+    except subprocess.TimeoutExpired:
+        return None, ""
+    finally:
+        if apart and process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
 
 
 def shortened(summary, tables):

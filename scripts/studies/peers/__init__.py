@@ -8,12 +8,9 @@ import json
 import os
 import pathlib
 import shutil
-import signal
 import statistics
 import subprocess
 import sys
-import tempfile
-import time
 
 from .. import measure
 from ..groups import circumstances
@@ -102,16 +99,23 @@ def run(arguments):
     install(PACKAGES)
     ours = measure.Program(arguments)
     ours.environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": petsc4py()}
-    records, failed = ours.records(RAW), 0
-    for repetition in range(1, arguments.repeat + 1):
-        for level in arguments.levels:
-            for program in ["fetiplast", *(p for p in arguments.peers if level <= FINEST.get(p, level))]:
-                record = solve(program, ours, level, arguments.limit)
-                record["repetition"] = repetition
-                records.add(record)
-                failed += record["exit_code"] not in (0, None)
-                print(told(record), flush=True)
-    return 1 if failed else 0
+    runs = [
+        run_of(program, level, ours)
+        for level in arguments.levels
+        for program in ["fetiplast", *(peer for peer in arguments.peers if level <= FINEST.get(peer, level))]
+    ]
+    return 1 if measure.run(runs, arguments, RAW, READ, ours, arguments.limit) else 0
+
+
+def run_of(program, level, ours):
+    """`ours` is fetiplast."""
+    label, options = {"level": level, "variant": f"peers/{program}", "ranks": RANKS}, ["--level", str(level)]
+    if program == "fetiplast":
+        return measure.Run(label, ["two-blocks", *options], RANKS)
+    if program == "calculix":
+        return measure.Run(label, [*options, "--threads", str(RANKS)], RANKS, [sys.executable, str(FOLDER / "calculix.py")])
+    start = [*ours.on(RANKS, PYTHON), str(FOLDER / "petsc.py")]
+    return measure.Run(label, [*PEERS[program], *options], RANKS, start)
 
 
 def petsc4py():
@@ -120,60 +124,14 @@ def petsc4py():
     return str(found[-1]) if found else ""
 
 
-def command_of(program, ours, level, out):
-    if program == "fetiplast":
-        options = ["solve", "two-blocks", "--level", str(level), "--progress", "off", "--out", out]
-        return [*ours.on(RANKS), *options, "--summary", f"{out}/summary.json"]
-    options = ["--level", str(level), "--out", out]
-    if program == "calculix":
-        return [sys.executable, str(FOLDER / "calculix.py"), *options, "--threads", str(RANKS)]
-    return [*ours.on(RANKS, PYTHON), str(FOLDER / "petsc.py"), *PEERS[program], *options]
-
-
-def ended(command, environment, limit):
-    """The exit code of a command, None if it and all its processes had to be ended after `limit` seconds, and the seconds."""
-    begin = time.perf_counter()
-    process = subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
-    )
-    try:
-        output, _ = process.communicate(timeout=limit)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-        return None, time.perf_counter() - begin
-    if process.returncode:
-        print(output, file=sys.stderr)
-    return process.returncode, time.perf_counter() - begin
-
-
-def solve(program, ours, level, limit):
-    """`ours` is fetiplast."""
-    started, load = measure.now(), os.getloadavg()[0]
-    with tempfile.TemporaryDirectory() as out:
-        command = command_of(program, ours, level, out)
-        code, seconds = ended(command, ours.environment, limit)
-        found = measure.read_summary(pathlib.Path(out) / "summary.json")
-    if program == "calculix" and found:
-        seconds = found["time_total"]
-    return {
-        "level": level,
-        "variant": f"peers/{program}",
-        "ranks": RANKS,
-        "exit_code": code,
-        "seconds": seconds,
-        "summary": measure.shortened(found, READ),
-        "provenance": {
-            "command": " ".join(pathlib.Path(w).name if w.startswith("/") else w for w in command),
-            "date": measure.date(started),
-            "load_average": load,
-            **ours.provenance(found),
-        },
-    }
-
-
 def program_of(record):
     return record["variant"].removeprefix("peers/")
+
+
+def seconds_of(record):
+    """Those of CalculiX are of `ccx` alone, without the writing of the input."""
+    alone = program_of(record) == "calculix" and record["summary"]
+    return alone["time_total"] if alone else record["seconds"]
 
 
 def work(record):
@@ -184,15 +142,6 @@ def work(record):
     if program == "fetiplast":
         return f"{s['newton_iterations']} Newton steps, {s['hessian_multiplications']} applications of F"
     return f"{s['newton_iterations']} Newton steps, {s['iterations']} linear iterations"
-
-
-def told(record):
-    what = f"level {record['level']}, {program_of(record)}: exit code {record['exit_code']}, {record['seconds']:.1f} s"
-    if record["exit_code"] is None:
-        return f"{what}: ended without a result"
-    if record["exit_code"] or not record["summary"]:
-        return what
-    return f"{what}, {record['summary']['peak_rss_mb']:.0f} MiB, {work(record)}"
 
 
 def read():
@@ -237,8 +186,8 @@ def level_table(level, found, reference):
             continue
         records, ours = found[level, program]
         summary, beside = records[0]["summary"], ours[0]["summary"]
-        seconds = [record["seconds"] for record in records]
-        ratio = statistics.median(seconds) / statistics.median(record["seconds"] for record in ours)
+        seconds = [seconds_of(record) for record in records]
+        ratio = statistics.median(seconds) / statistics.median(seconds_of(record) for record in ours)
         if any(record["exit_code"] is None for record in records):
             rows.append([program, f"no result after {min(seconds):.3g}", f"> {ratio:.0f}", *[""] * 6])
             continue

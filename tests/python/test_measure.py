@@ -1,4 +1,4 @@
-"""How pages are written or compared, what is recorded of a run, and which records stay."""
+"""How runs are ended and recorded, which records stay, and how pages are written or compared."""
 
 import json
 
@@ -35,3 +35,9 @@ def test_of_a_summary_only_the_tables_that_are_read_are_recorded():
     short = measure.shortened(summary, ("work", "steps"))
     assert short == {"energy": -1.0, "error": None, "work": {"a": 1}, "steps": [{"time": 1.0, "converged": True}]}
     assert measure.shortened(None, ()) is None
+
+
+def test_a_command_and_all_that_it_started_end_at_the_limit():
+    assert measure.ended(["sh", "-c", "sleep 60 & sleep 60"], None, limit=0.1) == (None, "")
+    assert measure.ended(["sh", "-c", "echo one; echo two >&2; exit 3"], None, limit=60) == (3, "one\ntwo\n")
+    assert measure.ended(["echo", "one"], None, limit=None) == (0, "one\n")
