@@ -1,7 +1,7 @@
 //! What the kernels cost, as JSON lines: the machine's limits, one subdomain of several sizes, the coarse problem.
 //!
-//! `cargo bench --bench kernels` on a quiet machine; `scripts/tables write` makes a table of the lines in
-//! `bench-results/kernels.jsonl`. Times are the best of several, in seconds.
+//! `scripts/bench run kernels` keeps the lines of `cargo bench --bench kernels` in `bench-results/raw/kernels`, beside
+//! CHOLMOD's; `scripts/bench write kernels` makes a page of them. Times are the best of several, in seconds.
 
 use std::time::Instant;
 

@@ -1,0 +1,27 @@
+"""Files that are made from others: written, or only compared. Tables in Markdown."""
+
+import sys
+
+from .measure import ROOT
+
+
+def table(head, rows):
+    """First column to the left, the others to the right."""
+    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+
+
+def write(files, only_check=False):
+    """`files`: text by path, None for a file that goes. Writes what has changed; with `only_check` fails if something would."""
+    stale = [path for path, text in files.items() if (path.read_text() if path.exists() else None) != text]
+    names = ", ".join(str(path.relative_to(ROOT) if path.is_relative_to(ROOT) else path) for path in stale)
+    if only_check and stale:
+        print(f"out of date: {names}. Run scripts/bench write.", file=sys.stderr)
+        return 1
+    for path in stale:
+        if files[path] is None:
+            path.unlink()
+        else:
+            path.write_text(files[path])
+    print(f"written: {names}" if stale else f"up to date: all {len(files)} files")
+    return 0

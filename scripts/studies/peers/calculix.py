@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+"""The benchmark two-blocks solved with CalculiX: what an engineer opens first.
+
+    scripts/studies/peers/calculix.py --level 1 --out DIR
+
+Writes DIR/two_blocks.inp with fetiplast's mesh as C3D4, isotropic hardening by *PLASTIC and penalty contact from surface
+to surface, runs `ccx` on it and reads its results. DIR/summary.json has them; `time_total` is that of ccx alone, for an
+engineer has the mesh already. Needs nothing but Python and ccx.
+"""
+
+import argparse
+import itertools
+import json
+import math
+import os
+import pathlib
+import re
+import resource
+import subprocess
+import sys
+import time
+
+INCREMENTS = 5
+PENALTY = 1e5
+"""Pressure per overclosure, MPa/mm. A hundred times as much changes the contact force at level 1 by 1e-6 and the largest
+displacement by 1e-3, and takes 1.6 times the iterations."""
+
+TETS = [(0, 1, 2, 5), (0, 2, 4, 5), (2, 4, 5, 6), (1, 3, 2, 5), (3, 5, 7, 2), (2, 5, 7, 6)]
+FACES = [(0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)]
+"""Of a C3D4, in CalculiX's order, S1 to S4."""
+
+
+def write(file, n):
+    h, cells, shift = 100 / n, (30 * n, 10 * n, 10 * n), 6 * n
+    nx, ny, nz = cells
+    per_body = (nx + 1) * (ny + 1) * (nz + 1)
+
+    def node(body, x, y, z):
+        return 1 + body * per_body + (x * (ny + 1) + y) * (nz + 1) + z
+
+    def lines(rows):
+        file.writelines(",".join(map(str, row)) + "\n" for row in rows)
+
+    def numbers(values):
+        lines([value] for value in values)
+
+    print("*NODE,NSET=NALL", file=file)
+    for body in (0, 1):
+        grid = itertools.product(*(range(c + 1) for c in cells))
+        lines((node(body, x, y, z), (x + shift * body) * h, y * h, z * h + 1000 * body) for x, y, z in grid)
+    element, faces = 0, {"MASTER": [], "SLAVE": [], "LOADED": []}
+    for body in (0, 1):
+        print(f"*ELEMENT,TYPE=C3D4,ELSET=BODY{body}", file=file)
+        for x, y, z in itertools.product(*map(range, cells)):
+            surfaces = []
+            if body == 0 and z == nz - 1 and x >= shift:
+                surfaces.append(("MASTER", 1))
+            if body == 1 and z == 0 and x < nx - shift:
+                surfaces.append(("SLAVE", 0))
+            if body == 1 and z == nz - 1:
+                surfaces.append(("LOADED", 1))
+            for tet in TETS:
+                element += 1
+                lines([[element, *(node(body, x + (v & 1), y + (v >> 1 & 1), z + (v >> 2)) for v in tet)]])
+                for name, top in surfaces:
+                    for number, face in enumerate(FACES, 1):
+                        if all(tet[corner] >> 2 == top for corner in face):
+                            faces[name].append((element, number))
+    print("*ELSET,ELSET=EALL\nBODY0,BODY1", file=file)
+    for body, x in ((0, 0), (1, nx)):
+        print(f"*NSET,NSET=FIX{body}", file=file)
+        numbers(node(body, x, y, z) for y in range(ny + 1) for z in range(nz + 1))
+    for name in ("MASTER", "SLAVE"):
+        print(f"*SURFACE,NAME={name},TYPE=ELEMENT", file=file)
+        lines((e, f"S{face}") for e, face in faces[name])
+    print(
+        "*MATERIAL,NAME=STEEL\n*ELASTIC\n210000.,0.29\n*PLASTIC\n450.,0.\n10450.,1.\n"
+        "*SOLID SECTION,ELSET=EALL,MATERIAL=STEEL\n"
+        f"*SURFACE INTERACTION,NAME=CONTACT\n*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR\n{PENALTY:g},1.\n"
+        "*CONTACT PAIR,INTERACTION=CONTACT,TYPE=SURFACE TO SURFACE\nSLAVE,MASTER\n"
+        "*BOUNDARY\nFIX0,1,3\nFIX1,1,3\n"
+        f"*STEP,INC=200\n*STATIC,SOLVER=ITERATIVE CHOLESKY\n{1 / INCREMENTS},1.,1e-5,{1 / INCREMENTS}\n*DLOAD",
+        file=file,
+    )
+    lines((e, f"P{face}", 150.0) for e, face in faces["LOADED"])
+    print(
+        "*NODE PRINT,NSET=FIX0,TOTALS=ONLY\nRF\n*NODE PRINT,NSET=NALL\nU\n*EL PRINT,ELSET=EALL\nPEEQ\n*END STEP", file=file
+    )
+
+
+def read(directory):
+    """Contact force, largest displacement and plastic elements of the last increment, and the iterations of all."""
+    blocks, rows = {}, []
+    for line in (directory / "two_blocks.dat").read_text().splitlines():
+        words = line.split()
+        if words and not re.match(r"[-+0-9.]", words[0]):
+            kind = words[0] if words[0] != "total" else "total force"
+            rows = blocks[kind] = []  # a later increment replaces the one before
+        elif words:
+            rows.append([float(word) for word in words])
+    iterations = len((directory / "two_blocks.cvg").read_text().splitlines()) - 4
+    increments = [line.split() for line in (directory / "two_blocks.sta").read_text().splitlines()[2:]]
+    return {
+        "contact_force": blocks["total force"][0][2],
+        "max_displacement": max(math.hypot(*row[1:]) for row in blocks["displacements"]),
+        "plastic_elements": sum(row[2] > 0 for row in blocks["equivalent"]),
+        "iterations": iterations,
+        "increments": len(increments),
+        "load": float(increments[-1][4]),
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--level", type=int, default=1)
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out"))
+    parser.add_argument("--threads", type=int, default=2)
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with open(arguments.out / "two_blocks.inp", "w") as file:
+        write(file, arguments.level)
+
+    environment = os.environ | {"OMP_NUM_THREADS": str(arguments.threads), "OPENBLAS_NUM_THREADS": "1"}
+    begin = time.perf_counter()
+    done = subprocess.run(["ccx", "two_blocks"], cwd=arguments.out, env=environment, capture_output=True, text=True)
+    seconds = time.perf_counter() - begin
+    (arguments.out / "ccx.log").write_text(done.stdout + done.stderr)
+    summary = {"level": arguments.level, "time_total": seconds, "converged": False}
+    summary["peak_rss_mb"] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    version = re.search(r"Version (\S+)", done.stdout)
+    summary["calculix"] = version.group(1).rstrip(",") if version else "unknown"
+    if done.returncode == 0 and "Job finished" in done.stdout:
+        summary |= read(arguments.out)
+        summary["converged"] = abs(summary["load"] - 1) < 1e-6
+    else:
+        print((done.stdout + done.stderr)[-2000:], file=sys.stderr)
+    (arguments.out / "summary.json").write_text(json.dumps(summary) + "\n")
+    print(json.dumps(summary))
+    return 0 if summary["converged"] else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
