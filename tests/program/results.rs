@@ -8,24 +8,25 @@ use crate::common::{Run, check, solve, solve_with};
 use serde_json::Value;
 
 fn can_read(python: &Path) -> bool {
-    Command::new(python).args(["-c", "import h5py, vtk"]).output().is_ok_and(|output| output.status.success())
+    Command::new(python).args(["-c", "import h5py, pytest, vtk"]).output().is_ok_and(|output| output.status.success())
 }
 
-/// A Python with h5py and VTK: the one of `scripts/setup --python`, or the system's.
+/// A Python with h5py, pytest and VTK: the one of `scripts/setup --python`, or the system's.
 fn python() -> PathBuf {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join(".venv/bin/python");
     [own, PathBuf::from("python3")]
         .into_iter()
         .find(|python| can_read(python))
-        .expect("no Python with h5py and vtk: run scripts/setup --python")
+        .expect("no Python with h5py, pytest and vtk: run scripts/setup --python")
 }
 
 fn assert_reads_back(run: &Run) {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/read_back.py");
-    let output = Command::new(python()).arg(script).arg(run.result()).output().unwrap();
+    let test = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/test_read_back.py");
+    let pytest = ["-m", "pytest", "--quiet", "--result"];
+    let output = Command::new(python()).args(pytest).arg(run.result()).arg(test).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
-    assert!(text(&output.stdout).contains("every value equal"), "{}", text(&output.stdout));
+    assert!(text(&output.stdout).contains("1 passed"), "{}", text(&output.stdout));
 }
 
 #[test]
