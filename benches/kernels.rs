@@ -7,18 +7,13 @@ use std::time::Instant;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
-use fetiplast::assembly::stiffness;
 use fetiplast::comm::solo::Solo;
-use fetiplast::decomposition::Subdomain;
-use fetiplast::feti::coarse::Coarse;
-use fetiplast::feti::dual::gather::Gather;
-use fetiplast::feti::inverse::factor::{Factors, analyse};
-use fetiplast::feti::inverse::kernel::RigidModes;
-use fetiplast::feti::inverse::schur::Schur;
-use fetiplast::model;
-use fetiplast::model::discrete::Discrete;
+use fetiplast::kernels::{
+    Analysis, Coarse, Factor, Factors, Gather, Lower, Precision, RigidModes, Schur, Subdomain, Workspace, analyse,
+    stiffness,
+};
+use fetiplast::model::{self, Discrete};
 use fetiplast::scene::Scene;
-use fetiplast::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use serde_json::json;
 
 /// Subdomains a problem: as many as are solved together.

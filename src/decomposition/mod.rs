@@ -16,7 +16,7 @@ pub mod twins;
 
 pub use clusters::Clusters;
 pub use interface::InterfaceNode;
-pub use subdomain::{Facet, Subdomain};
+pub use subdomain::Subdomain;
 
 use std::collections::BTreeMap;
 

@@ -1,6 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Bodies, BodyMesh, Counts, Cut, Facet, Patch, Shape, Subdomain, Surface, number_bodies, tear};
+use super::subdomain::Facet;
+use super::{Bodies, BodyMesh, Counts, Cut, Patch, Shape, Subdomain, Surface, number_bodies, tear};
 use crate::comm::solo::Solo;
 use crate::comm::threads;
 use crate::element::{Kind, tet4};

@@ -25,14 +25,10 @@ pub mod residuals;
 pub mod snapshot;
 pub mod step;
 
-pub use certificate::Certificate;
-pub use committed::Committed;
-pub use errors::Errors;
 pub use iteration::{Begin, Iterate, Newton, Next, Settings, Start};
 pub use outcome::{Outcome, StepRecord};
 pub use problem::TornProblem;
 pub use program::{Method, ProgramSettings};
-pub use residuals::Residuals;
 pub use snapshot::Snapshot;
 pub use step::{SolverState, StepSolver};
 

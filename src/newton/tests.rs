@@ -6,7 +6,7 @@ use crate::model;
 use crate::monitor::timing::Timer;
 use crate::record::summary::Summary;
 use crate::restart;
-use crate::results::piece::{Field, Piece, Values};
+use crate::results::piece::Piece;
 use crate::scene::Scene;
 use crate::study;
 
@@ -30,9 +30,7 @@ fn solve(scene: &Scene, ranks: usize) -> (Summary, Vec<u64>) {
         let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
         let solved = study::solve(scene, &discrete, comm, study::Begin::Rest, &Timer::start(), &mut ())
             .expect("the bodies are held");
-        let field = solved.piece.point_data.into_iter().find(|field| field.name == "displacement");
-        let mut states = field.map(|field: Field| field.states).unwrap_or_default();
-        let Some(Values::Real(u)) = states.pop() else { panic!("displacements are real") };
+        let u = solved.piece.last("displacement").expect("it is recorded").to_vec();
         (solved.summary, u)
     });
     let displacements = parts.iter().flat_map(|(_, u)| u).map(|u| u.to_bits()).collect();

@@ -66,6 +66,14 @@ impl Field {
     }
 }
 
+impl Piece {
+    /// Real numbers of a field of points or of cells at the last time; `None` if there is no such field.
+    pub fn last(&self, name: &str) -> Option<&[f64]> {
+        let field = self.point_data.iter().chain(&self.cell_data).find(|field| field.name == name)?;
+        field.states.last()?.real()
+    }
+}
+
 impl Field {
     /// All ranks' rows one behind the other, on every rank. Collective; all ranks have the same states.
     pub(super) fn gather(&self, comm: &dyn Comm) -> Self {

@@ -8,5 +8,5 @@ pub mod likeness;
 pub mod memory;
 pub mod sizes;
 
-pub use likeness::{Look, Refused, look};
+pub use likeness::look;
 pub use sizes::{memory, sizes};

@@ -21,7 +21,7 @@ use crate::comm::Comm;
 use crate::material::Material;
 use crate::scene::{Element, Scene, SceneError};
 use crate::study::StudyError;
-pub use measured::{Demand, Error, Measured, Row, Verdict};
+pub use measured::{Demand, Error, Measured, Row};
 use run::Exact;
 pub use run::Run;
 

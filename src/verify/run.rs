@@ -181,7 +181,7 @@ impl<'a> Run<'a> {
     /// Error of a field on cells in the mean square, relative to the closed form, whose mean over each cell is compared.
     /// Collective.
     pub fn cells(&self, field: &str, exact: impl Fn(usize, [f64; 3]) -> f64) -> f64 {
-        let found = last_state(&self.solved.piece.cell_data, field);
+        let found = self.solved.piece.last(field).expect("results have this field");
         let mut cell = 0;
         let mut partial = Vec::new();
         for (subdomain, u) in self.subdomains() {
@@ -206,7 +206,7 @@ impl<'a> Run<'a> {
 
     /// All contact conditions: place of the slave node, pressure, and the area it acts on. Collective.
     pub fn contacts(&self) -> Vec<Touch> {
-        let found = last_state(&self.solved.piece.point_data, "contact_pressure");
+        let found = self.solved.piece.last("contact_pressure").expect("results have this field");
         let mut mine = vec![f64::NEG_INFINITY; 4 * self.discrete.pairs.len()];
         let mut first = 0;
         for (subdomain, _) in self.subdomains() {
@@ -244,12 +244,6 @@ pub fn pressure_error(touches: &[Touch], exact: impl Fn([f64; 3]) -> f64) -> f64
 
 /// What [`samples`] gives for each element.
 const SAMPLES: usize = 27;
-
-/// The numbers of a real field at the end of the run.
-fn last_state<'a>(fields: &'a [crate::results::piece::Field], name: &str) -> &'a [f64] {
-    let field = fields.iter().find(|field| field.name == name).expect("results have the fields of the README");
-    field.states.last().and_then(|state| state.real()).expect("the field is real and was recorded")
-}
 
 /// A displacement at a point.
 struct There {
