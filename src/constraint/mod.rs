@@ -19,6 +19,7 @@ pub mod components;
 pub mod contact;
 pub mod dirichlet;
 pub mod gluing;
+pub mod law;
 pub mod ties;
 
 use std::ops::Range;
@@ -39,7 +40,7 @@ pub enum Kind {
         /// Component.
         axis: usize,
     },
-    /// Two surfaces do not penetrate: the multiplier is at least zero.
+    /// Two surfaces do not penetrate.
     Contact {
         /// Index of the contact pair.
         pair: usize,
@@ -59,7 +60,7 @@ pub struct Term {
     pub value: f64,
 }
 
-/// One row: `sum of terms = rhs`, or `<= rhs` for contact.
+/// One row: `sum of terms = rhs`, or `<= rhs` for contact ([`law`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// What it stands for.
@@ -87,6 +88,13 @@ pub struct Held {
     pub weight: f64,
 }
 
+impl Kind {
+    /// Whether the row is of a contact: its force is one that surfaces exert on each other.
+    pub fn is_contact(self) -> bool {
+        matches!(self, Self::Contact { .. })
+    }
+}
+
 impl Term {
     /// Whether both belong to one copy of a node, in one row.
     pub fn share_slot(&self, other: &Self) -> bool {
@@ -112,11 +120,6 @@ impl Row {
             self.scale *= self.length;
             self.terms.iter_mut().for_each(|term| term.value *= self.length);
         }
-    }
-
-    /// Whether the multiplier is bounded below by zero.
-    pub fn is_inequality(&self) -> bool {
-        matches!(self.kind, Kind::Contact { .. })
     }
 }
 

@@ -87,12 +87,7 @@ impl StepSolver<'_> {
             timer.time("certificate", || self.operator.invert(&mut torn));
             self.add_bonds(problem, [&mut lambda]);
         }
-        let pull: Vec<f64> = lambda
-            .iter()
-            .zip(&problem.constraints.rows)
-            .map(|(l, row)| l * f64::from(u8::from(row.is_inequality())))
-            .collect();
-        let open = problem.space.dots(&[(&pull, &problem.slack(u))])[0].max(0.0);
+        let open = problem.space.dots(&[(&problem.of_contact(&lambda), &problem.slack(u))])[0].max(0.0);
 
         let (mut v, mut change) = (u.clone(), problem.gather.zeros());
         let mut rho = problem.unbalance(state);
@@ -150,23 +145,19 @@ impl StepSolver<'_> {
     fn balance(&self, problem: &TornProblem, lambda: &[f64]) -> (Vec<f64>, bool) {
         let coarse = &self.projector.coarse;
         let wanted = recover::resultants(problem.subdomains, problem.modes, coarse, &problem.loads);
-        let is_contact = |row: usize| problem.constraints.rows[row].is_inequality();
+        let laws = problem.constraints.laws();
         let largest = |mine: f64| problem.space.maximum(mine);
         let mut lambda = lambda.to_vec();
         for attempt in 0..BALANCINGS {
-            let contacts = lambda.iter_mut().enumerate().filter(|(row, _)| is_contact(*row));
-            let most = largest(contacts.fold(0.0, |most, (_, l)| {
-                *l = l.max(0.0);
-                most.max(*l)
-            }));
+            laws.project(&mut lambda);
+            let most = largest(problem.of_contact(&lambda).iter().fold(0.0, |most, l| most.max(l.abs())));
             let missing: Vec<f64> = wanted.iter().zip(coarse.apply(&lambda)).map(|(e, g)| e - g).collect();
             let fresh;
             // The rows of the last step have a factor.
             let face = match self.programs.held().filter(|_| attempt == 0) {
                 Some(face) => face,
                 None => {
-                    let held = (0..lambda.len()).map(|row| !is_contact(row) || lambda[row] > ROUNDING * most);
-                    match CoarseFace::new(coarse, held.collect()) {
+                    match CoarseFace::new(coarse, laws.kept(&lambda, ROUNDING * most)) {
                         Ok(face) => fresh = face,
                         Err(_) => return (lambda, false),
                     }
@@ -174,8 +165,7 @@ impl StepSolver<'_> {
                 }
             };
             face.add_balance(coarse, missing, &mut lambda);
-            let contacts = lambda.iter().enumerate().filter(|(row, _)| is_contact(*row));
-            if largest(contacts.fold(0.0, |pull, (_, l)| pull.max(-l))) <= ROUNDING * most {
+            if largest(laws.distance(&lambda)) <= ROUNDING * most {
                 let norm = |squares: f64| squares.sqrt();
                 let left = norm(wanted.iter().zip(coarse.apply(&lambda)).map(|(e, g)| (e - g).powi(2)).sum());
                 let size = norm(problem.space.dots(&[(&lambda, &lambda)])[0]).max(norm(dot(&wanted, &wanted)));

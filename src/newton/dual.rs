@@ -127,8 +127,10 @@ impl DualFace<'_, '_> {
             let moved = self.coarse().moved(&motion);
             let most = self.dual.space.maximum(moved.iter().fold(0.0, |most, m| most.max(m.abs())));
             let mut joined = 0.0;
-            for (kept, _) in kept.iter_mut().zip(&moved).filter(|(kept, m)| !**kept && **m > RESISTS * most) {
-                (*kept, joined) = (true, 1.0);
+            for ((kept, row), &moved) in kept.iter_mut().zip(&self.constraints.rows).zip(&moved) {
+                if !*kept && row.law().resists(moved, RESISTS * most) {
+                    (*kept, joined) = (true, 1.0);
+                }
             }
             if self.dual.space.maximum(joined) == 0.0 {
                 return false;

@@ -252,8 +252,7 @@ pub fn follow(
 
 /// The start that a committed solution is for the next increment.
 fn beginning(problem: &TornProblem, solution: &Solution) -> Start {
-    let rows = problem.constraints.rows.iter().zip(&solution.lambda);
-    let held = rows.map(|(row, &lambda)| !row.is_inequality() || lambda > 0.0).collect();
+    let held = problem.constraints.laws().kept(&solution.lambda, 0.0);
     Start { u: solution.u.clone(), held }
 }
 

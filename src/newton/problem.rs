@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use super::committed::Committed;
 use crate::assembly::Region;
 use crate::assembly::internal::{self, Terms};
-use crate::constraint::{Constraints, Kind};
+use crate::constraint::Constraints;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
@@ -147,36 +147,28 @@ impl TornProblem<'_> {
         slack
     }
 
-    /// The part of the slack that violates its constraint.
-    fn violated(&self, mut slack: Vec<f64>) -> Vec<f64> {
-        for (s, row) in slack.iter_mut().zip(&self.constraints.rows) {
-            if row.is_inequality() {
-                *s = s.min(0.0);
-            }
-        }
-        slack
-    }
-
     /// Corrects a displacement by `B'` until it is admissible. Where rows are orthogonal that is the projection.
     pub fn make_admissible(&self, u: &mut Torn) {
         let slack = self.slack(u);
-        let mut correction = self.violated(slack.clone());
-        self.coupling.borrow_mut().close(&slack, &mut correction);
+        let mut correction = slack.clone();
+        self.constraints.laws().violation(&mut correction);
+        self.coupling.borrow_mut().close(self.constraints, &slack, &mut correction);
         self.gather.add_transpose(1.0, &correction, u);
     }
 
     /// Whether a displacement satisfies all constraints to round-off.
     pub fn is_admissible(&self, u: &Torn) -> bool {
-        let violation = self.violated(self.slack(u));
+        let mut violation = self.slack(u);
+        self.constraints.laws().violation(&mut violation);
         let squares = self.space.dots(&[(&violation, &violation), (&self.rhs, &self.rhs)]);
         squares[0] <= f64::EPSILON * squares[1]
     }
 
-    /// Number of contact rows with a positive multiplier. One collective.
+    /// Number of contact rows that are closed. One collective.
     pub fn active_contacts(&self, lambda: &[f64]) -> usize {
         let active = |row: u32| {
-            let kind = self.constraints.rows[row as usize].kind;
-            matches!(kind, Kind::Contact { .. }) && lambda[row as usize] > 0.0
+            let of = &self.constraints.rows[row as usize];
+            of.kind.is_contact() && of.law().status(lambda[row as usize]).is_closed()
         };
         let partial: Vec<f64> =
             self.space.owned().iter().map(|rows| rows.iter().filter(|&&row| active(row)).count() as f64).collect();

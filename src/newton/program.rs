@@ -225,7 +225,7 @@ impl Programs {
         limits: Limits,
     ) -> Result<Found, Floating> {
         let space = Multipliers(problem.space, dual.timer);
-        let bounded: Vec<bool> = problem.constraints.rows.iter().map(|row| row.is_inequality()).collect();
+        let bounded = problem.constraints.laws().may_open();
         let rows = self.take_face(&dual.projector.coarse, bounded.len())?;
         let mut kept = rows.kept().to_vec();
         let mut face =
@@ -240,7 +240,7 @@ impl Programs {
         let at_floor = self.note(&limits, solution.first_norm);
         let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;
         let mut lambda = balanced.clone();
-        lambda.iter_mut().zip(&bounded).filter(|(_, bounded)| **bounded).for_each(|(l, _)| *l = l.max(0.0));
+        problem.constraints.laws().project(&mut lambda);
         self.last = Some((lambda.clone(), face.rows));
         Ok(Found { lambda, balanced, outcome, statistics, at_floor })
     }
@@ -273,8 +273,7 @@ impl Programs {
                 projector.coarse.add_transpose(1.0, &a, &mut multiplier);
                 multiplier
             });
-            let contacts = problem.constraints.rows.iter().zip(&start);
-            let lower = contacts.map(|(row, l)| if row.is_inequality() { -l } else { f64::NEG_INFINITY }).collect();
+            let lower = problem.constraints.laws().lower_bounds(&start);
             let expansion = match self.settings.method {
                 Method::Smalse(expansion) => expansion,
                 Method::ActiveSet => Expansion::ProjectedCg,
@@ -293,8 +292,8 @@ impl Programs {
         let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
-        let held = problem.constraints.rows.iter().zip(&lambda).map(|(row, &l)| !row.is_inequality() || l > 0.0);
-        let face = timer.time("coarse set-up", || CoarseFace::new(&projector.coarse, held.collect()))?;
+        let kept = problem.constraints.laws().kept(&lambda, 0.0);
+        let face = timer.time("coarse set-up", || CoarseFace::new(&projector.coarse, kept))?;
         self.last = Some((lambda.clone(), face));
         Ok(Found { lambda, balanced, outcome, statistics, at_floor })
     }

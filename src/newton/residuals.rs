@@ -55,7 +55,7 @@ impl TornProblem<'_> {
     pub(super) fn measure(&self, u: &Torn, state: &State, lambda: &[f64]) -> (Residuals, Sizes) {
         let unbalanced = self.unbalanced(state, lambda);
         let mut free = unbalanced.clone();
-        self.remove(&mut free, |kind| !matches!(kind, Kind::Contact { .. }));
+        self.remove(&mut free, |kind| !kind.is_contact());
         let mut applied = self.loads.clone();
         self.remove(&mut applied, |kind| kind == Kind::Gluing);
         let mut internal = state.forces.clone();
@@ -69,8 +69,8 @@ impl TornProblem<'_> {
         let mut worst = [0.0_f64; 5];
         for ((row, &s), &force) in self.constraints.rows.iter().zip(&slack).zip(lambda) {
             let (gap, force) = (s / row.scale, row.scale * force);
-            let found = if row.is_inequality() {
-                [0.0, (-gap).max(0.0), (gap * force).abs(), force.abs(), 0.0]
+            let found = if row.kind.is_contact() {
+                [0.0, row.law().violation(gap).abs(), (gap * force).abs(), force.abs(), 0.0]
             } else {
                 [s.abs() / row.length, 0.0, 0.0, 0.0, 0.0]
             };
@@ -102,7 +102,7 @@ impl TornProblem<'_> {
     /// `lambda_I`: the multipliers of contact, zeros in place of the others.
     pub(super) fn of_contact(&self, lambda: &[f64]) -> Vec<f64> {
         let rows = self.constraints.rows.iter().zip(lambda);
-        rows.map(|(row, &l)| if row.is_inequality() { l } else { 0.0 }).collect()
+        rows.map(|(row, &l)| if row.kind.is_contact() { l } else { 0.0 }).collect()
     }
 
     /// Force of each support on the bodies, `[support][component]`. Collective.

@@ -125,15 +125,7 @@ impl<'a> StepSolver<'a> {
         let mut lambda = vec![0.0; held.len()];
         problem.gather.apply(&problem.unbalance(state), &mut lambda);
         problem.coupling.borrow_mut().solve(&mut lambda, |row| held[row]);
-        for ((l, row), &held) in lambda.iter_mut().zip(&problem.constraints.rows).zip(&held) {
-            *l = if !held {
-                0.0
-            } else if row.is_inequality() {
-                l.max(0.0)
-            } else {
-                *l
-            };
-        }
+        problem.constraints.laws().project_onto(&held, &mut lambda);
         self.programs.expect(&self.projector.coarse, &lambda, held);
         lambda
     }
@@ -298,10 +290,9 @@ impl<'a> StepSolver<'a> {
         let (Some(preconditioner), Some(held)) = (&mut self.preconditioner, self.programs.held()) else { return };
         let mut defect = vec![0.0; slack.len()];
         problem.gather.apply(du, &mut defect);
-        for ((d, s), row) in defect.iter_mut().zip(slack).zip(&problem.constraints.rows) {
-            *d = if row.is_inequality() { (s - *d).min(0.0) } else { s - *d };
-        }
-        let kept = |row: usize| held.kept()[row] || defect[row] < 0.0;
+        defect.iter_mut().zip(slack).for_each(|(d, s)| *d = s - *d);
+        problem.constraints.laws().violation(&mut defect);
+        let kept = |row: usize| held.kept()[row] || defect[row] != 0.0;
         timer.time("scaling", || preconditioner.scaling.restrict(problem.constraints, kept));
         timer.time("preconditioner", || preconditioner.mend(&defect, du));
     }

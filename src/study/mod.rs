@@ -238,8 +238,7 @@ pub fn solve_from(
         }
         Begin::After(Earlier { committed, u }) => {
             let closed = ROUNDING * committed.sizes.displacement;
-            let rows = constraints.rows.iter().zip(problem.slack(&u));
-            let held = rows.map(|(row, slack)| !row.is_inequality() || slack <= closed).collect();
+            let held = constraints.laws().kept_at(&problem.slack(&u), closed);
             problem.committed = committed;
             Entry::Near(newton::Start { u, held })
         }
@@ -267,7 +266,7 @@ pub fn solve_from(
             let (piece, rows) = &mut *reached.borrow_mut();
             let von_mises = fields::record(piece, at.time(), problem, solution, discrete.touching(), &contact);
             rows.push(step_row(comm, scene, discrete, problem, (at, solution), &contact, von_mises));
-            closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
+            closed = contact.iter().filter(|state| state.status.is_closed()).map(|state| state.pair as u64).collect();
         }
     };
     let pause = |halt: &dyn Fn() -> loading::Halt| {
