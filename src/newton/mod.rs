@@ -214,7 +214,7 @@ pub fn solve(
     let mut state = problem.evaluate(&u);
     let mut refused = None;
     if let Some(stood) = stood {
-        refused = solver.resume(problem, stood, &lambda, timer).err();
+        refused = solver.resume(problem, stood, timer).err();
     } else {
         solver.begin();
     }
@@ -243,7 +243,8 @@ pub fn solve(
         if problem.is_linear() && settings.accuracy.is_none() {
             forcing.drop = solver.linear_drop();
         }
-        let step = match solver.solve(problem, (&u, &state), forcing, timer, &|n| alive(steps.len() + 1, n)) {
+        let last = attempts.last().map_or(&lambda, |attempt| &attempt.lambda);
+        let step = match solver.solve(problem, (&u, &state), last, forcing, timer, &|n| alive(steps.len() + 1, n)) {
             Ok(step) => step,
             Err(message) => break Outcome::Singular(message),
         };
