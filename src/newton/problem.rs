@@ -28,7 +28,7 @@ pub struct TornProblem<'a> {
     pub loads: Torn,
     /// `c`: right-hand sides of the rows.
     pub rhs: Vec<f64>,
-    /// What former increments of the load left behind.
+    /// State that former increments left.
     pub committed: Committed,
     /// The rows of B.
     pub constraints: &'a Constraints,
@@ -58,12 +58,12 @@ pub struct State {
     pub plastic: usize,
     /// Elements of each own subdomain that yield.
     pub yielding: Vec<usize>,
-    /// What could cancel in forces and energies.
+    /// Sizes of the terms that forces and energies are sums of.
     pub terms: Terms,
 }
 
-/// Energies and forces are compared with those that are there, and at least with this share of the terms that they are
-/// sums of (in the energy norm, of its root): where bodies move without strain, all that is there is round-off.
+/// Least size that energies and forces are relative to, as a share of the terms that they are sums of (in the energy norm,
+/// of their root). Bodies that move without strain have nothing but round-off in these sums.
 pub(super) const SIGNIFICANT: f64 = 1e-8;
 
 impl TornProblem<'_> {
@@ -147,7 +147,7 @@ impl TornProblem<'_> {
         slack
     }
 
-    /// Corrects a displacement by `B'` until it is admissible. Where rows are orthogonal that is the projection.
+    /// Adds `B'x` to a displacement that makes it admissible. Where rows are orthogonal that is the projection.
     pub fn make_admissible(&self, u: &mut Torn) {
         let slack = self.slack(u);
         let mut correction = slack.clone();
