@@ -182,6 +182,10 @@ impl Laws<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+    use std::fs;
+    use std::path::Path;
+
     use super::*;
 
     const LAWS: [Law; 2] = [Law::Equality, Law::Unilateral];
@@ -235,5 +239,82 @@ mod tests {
         assert!(Law::Unilateral.is_kept(2.0, 1.0) && !Law::Unilateral.is_kept(0.5, 1.0));
         assert!(Law::Unilateral.is_kept_at(0.5, 1.0) && !Law::Unilateral.is_kept_at(2.0, 1.0));
         assert!(Law::Equality.is_kept(-3.0, 1.0) && Law::Equality.is_kept_at(2.0, 1.0));
+    }
+
+    /// Code of the library without its tests, by path.
+    fn sources(directory: &Path) -> Vec<(String, String)> {
+        let mut found = Vec::new();
+        for entry in fs::read_dir(directory).expect("sources can be read") {
+            let path = entry.expect("sources can be read").path();
+            if path.is_dir() {
+                found.extend(sources(&path));
+            } else if path.extension().is_some_and(|end| end == "rs") && path.file_stem().is_some_and(|s| s != "tests")
+            {
+                let text = fs::read_to_string(&path).expect("sources can be read");
+                let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default().to_owned();
+                let name = path.strip_prefix(env!("CARGO_MANIFEST_DIR")).expect("it is below").display().to_string();
+                found.push((name, code));
+            }
+        }
+        found
+    }
+
+    fn library() -> Vec<(String, String)> {
+        sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
+    }
+
+    /// The files that CONTRIBUTING.md names in its section on contact laws.
+    fn listed() -> BTreeSet<String> {
+        let text = include_str!("../../CONTRIBUTING.md");
+        let section = text.split_once("### A contact law\n").expect("there is such a section").1;
+        let section = section.split("\n#").next().unwrap_or_default();
+        section.split('`').filter(|word| word.starts_with("src/")).map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn contributing_lists_the_files_that_a_contact_law_touches() {
+        let asks = |code: &str| {
+            let words = [".law()", ".laws()", "constraint::law", "pub mod law;", "is_contact()", "Kind::Contact"];
+            words.iter().any(|word| code.contains(word))
+        };
+        let asking: BTreeSet<String> =
+            library().into_iter().filter(|(_, code)| asks(code)).map(|(name, _)| name).collect();
+        let solvers = ["src/qp/feasible.rs", "src/qp/active_set.rs", "src/newton/damping.rs"].map(str::to_owned);
+        let expected: BTreeSet<String> = asking.into_iter().chain(solvers).collect();
+        assert_eq!(listed(), expected, "left: CONTRIBUTING.md, right: the sources");
+    }
+
+    /// The usual ways to write it down a second time.
+    #[test]
+    fn the_sign_of_contact_is_known_here_only() {
+        let words = [
+            "is_inequality",
+            "Law::Unilateral",
+            "lambda > 0.0",
+            "lambda >= 0.0",
+            "lambda.max(0.0)",
+            "l > 0.0",
+            "l.max(0.0)",
+            "force > 0.0",
+            "slack < 0.0",
+            "slack <= 0.0",
+            "slack[row] < 0.0",
+            "slack.min(0.0)",
+            "gap.min(0.0)",
+            "(-gap).max(0.0)",
+        ];
+        let elsewhere = library().into_iter().filter(|(name, _)| name != "src/constraint/law.rs");
+        for (name, code) in elsewhere {
+            let code = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+            for line in code {
+                assert!(!words.iter().any(|word| contains(line, word)), "{name}: {line}");
+            }
+        }
+    }
+
+    /// Whether a line has this text, which begins with a whole word.
+    fn contains(line: &str, text: &str) -> bool {
+        let part_of_name = |c: char| c.is_alphanumeric() || c == '_';
+        line.match_indices(text).any(|(at, _)| !line[..at].ends_with(part_of_name))
     }
 }
