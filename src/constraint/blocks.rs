@@ -110,7 +110,8 @@ impl Constraints {
         self.slot_begin[row] as usize..self.slot_begin[row + 1] as usize
     }
 
-    /// Adds to multipliers those of the rows of some kinds whose forces have this `change` by `B`.
+    /// Adds to multipliers of some kinds those whose forces `B'l` change `B f` by `change`: `l = change / |row|^2`, as these
+    /// rows are orthogonal.
     pub fn add_forces(&self, change: &[f64], of: impl Fn(Kind) -> bool, lambda: &mut [f64]) {
         let rows = self.rows.iter().zip(change).zip(lambda).filter(|((row, _), _)| of(row.kind));
         rows.for_each(|((row, change), l)| *l += change / (row.length * row.length));
@@ -130,7 +131,7 @@ fn gather_nodes(
 ) -> BTreeMap<u64, InterfaceNode> {
     let mut mine = Vec::new();
     for node in decomposition.interface.iter().filter(|n| cluster_of.contains_key(&n.node)) {
-        // The rank of the lowest copy speaks for the node.
+        // The rank of the lowest copy sends the node.
         if decomposition.own_index(node.copies[0]).is_some() {
             node.pack(&mut mine);
         }

@@ -2,20 +2,20 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// A forest of the nodes that have been joined; others take no room.
+/// A union-find forest of the nodes that have been joined. Other nodes take no memory.
 #[derive(Default)]
 pub struct Components {
     parent: HashMap<u64, u64>,
 }
 
 impl Components {
-    /// From now on two nodes, which may be one, are in one component.
+    /// Puts two nodes into one component. They may be the same node.
     pub fn join(&mut self, one: u64, other: u64) {
         let (a, b) = (self.root(one), self.root(other));
         self.parent.insert(a.max(b), a.min(b));
     }
 
-    /// The nodes of each component, by its lowest.
+    /// The nodes of each component, keyed by its lowest node.
     pub fn members(mut self) -> BTreeMap<u64, BTreeSet<u64>> {
         let mut members: BTreeMap<u64, BTreeSet<u64>> = BTreeMap::new();
         for node in self.parent.keys().copied().collect::<Vec<_>>() {
@@ -30,7 +30,7 @@ impl Components {
             if up == node {
                 return node;
             }
-            // Halves the way for the next search.
+            // Path halving.
             let further = self.parent[&up];
             self.parent.insert(node, further);
             node = further;

@@ -5,14 +5,14 @@
 //! support rows and the active rows independent. Of rows with one direction (a node that meets two obstacles alike) only
 //! the tightest counts, which implies the others.
 
-use super::{Held, Kind, Row, Term};
+use super::{Fixed, Kind, Row, Term};
 use crate::contact::ContactPair;
 use crate::decomposition::InterfaceNode;
 
-/// One node of a contact: what supports fix there.
+/// One node of a contact, and for each component the support that fixes it, with the value (length).
 pub(super) type Side<'a> = (&'a InterfaceNode, [Option<(usize, f64)>; 3]);
 
-/// Cosine from which two rows have one direction.
+/// Rows with a cosine above this are parallel.
 const PARALLEL: f64 = 1.0 - 1e-12;
 
 /// Nodes of a pair and their factors in its condition.
@@ -21,13 +21,13 @@ pub(super) fn nodes(pair: &ContactPair) -> impl Iterator<Item = (u64, f64)> {
     pair.slaves.iter().copied().chain(masters)
 }
 
-/// The row of a pair; `sides` knows its nodes.
+/// The row of pair `number`; `sides` gives its nodes by their global number.
 ///
 /// # Errors
 /// If supports fix all nodes along the normal: the distance that is left for good (length).
 pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> Side<'a>) -> Result<Row, f64> {
     let mut rhs = pair.gap;
-    let (mut terms, mut held) = (Vec::new(), Vec::new());
+    let (mut terms, mut moved) = (Vec::new(), Vec::new());
     let mut square = 0.0;
     for (node, factor) in nodes(pair) {
         let (node, fixed) = sides(node);
@@ -37,7 +37,7 @@ pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> 
                 Some((support, value)) => {
                     let weight = factor * component;
                     rhs -= weight * value;
-                    held.push(Held { support, axis, weight });
+                    moved.push(Fixed { support, axis, weight });
                 }
                 None if component == 0.0 => {}
                 None => {
@@ -48,16 +48,16 @@ pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> 
             }
         }
     }
-    // A direction fixed but for round-off in the normal is fixed.
+    // What is left of the normal is round-off: the direction is fixed.
     if square < 1e-16 {
         return Err(rhs);
     }
     let scale = 1.0 / square.sqrt();
     terms.iter_mut().for_each(|term| term.value *= scale);
-    Ok(Row { kind: Kind::Contact { pair: number }, rhs: scale * rhs, scale, length: 1.0, terms, held })
+    Ok(Row { kind: Kind::Contact { pair: number }, rhs: scale * rhs, scale, length: 1.0, terms, fixed: moved })
 }
 
-/// Adds a row to those of the same slave node, unless one of them implies it; takes its place where it implies that one.
+/// Adds a row to those of the same slave node. Of two parallel rows only the one with the smaller gap stays.
 pub(super) fn add_tightest(rows: &mut Vec<Row>, row: Row) {
     let same = |a: &Term, b: &Term| (a.subdomain, a.node, a.axis) == (b.subdomain, b.node, b.axis);
     let parallel = |other: &&mut Row| {

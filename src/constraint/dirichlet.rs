@@ -11,9 +11,9 @@ pub(super) fn fixed(node: &InterfaceNode, supports: &[Support]) -> [Option<(usiz
     [0, 1, 2].map(|axis| at(node, supports, axis).next())
 }
 
-/// Which components supports fix at some nodes, ascending, perhaps several times, and all on named surfaces. Collective: the
-/// nodes are the same on every rank.
-pub fn held(comm: &dyn Comm, interface: &[InterfaceNode], supports: &[Support], nodes: &[u64]) -> Vec<[bool; 3]> {
+/// Which components supports fix at some nodes of named surfaces. The nodes are ascending, may be repeated, and are the same
+/// on every rank. Collective.
+pub fn fixed_at(comm: &dyn Comm, interface: &[InterfaceNode], supports: &[Support], nodes: &[u64]) -> Vec<[bool; 3]> {
     let mut mine = Vec::new();
     for node in interface.iter().filter(|node| nodes.binary_search(&node.node).is_ok()) {
         let fixed = fixed(node, supports).map(|support| u64::from(support.is_some()));
@@ -21,8 +21,8 @@ pub fn held(comm: &dyn Comm, interface: &[InterfaceNode], supports: &[Support], 
     }
     let all = all_gather_u64(comm, &mine);
     let reports = all.as_chunks::<4>().0.iter().map(|&[node, x, y, z]| (node, [x, y, z].map(|fixed| fixed == 1)));
-    let held: HashMap<u64, [bool; 3]> = reports.collect();
-    nodes.iter().map(|node| held.get(node).copied().unwrap_or_default()).collect()
+    let found: HashMap<u64, [bool; 3]> = reports.collect();
+    nodes.iter().map(|node| found.get(node).copied().unwrap_or_default()).collect()
 }
 
 /// The supports that fix a component at a node, and their values.
@@ -34,7 +34,7 @@ fn at(node: &InterfaceNode, supports: &[Support], axis: usize) -> impl Iterator<
 /// Whether supports agree wherever they meet. Collective.
 ///
 /// # Errors
-/// If two of them prescribe different values at one node: on every rank, that of the lowest such node.
+/// If two supports prescribe different values at a node. Every rank returns the error of the lowest such node.
 pub(super) fn check(comm: &dyn Comm, nodes: &[InterfaceNode], supports: &[Support]) -> Result<(), ConstraintError> {
     let conflict = |node: &InterfaceNode| {
         (0..3).find_map(|axis| {
@@ -71,7 +71,7 @@ pub(super) fn rows(node: &InterfaceNode, fixed: &[Option<(usize, f64)>; 3]) -> V
             .iter()
             .map(|&subdomain| Term { subdomain, node: node.node, axis, value: 1.0 / root })
             .collect(),
-        held: Vec::new(),
+        fixed: Vec::new(),
     };
     (0..3).filter_map(|axis| fixed[axis].map(|(support, value)| row(axis, support, value))).collect()
 }

@@ -1,10 +1,10 @@
 //! The rows of B: gluing of copies, supports and contact. All are orthogonal but for contact rows that share nodes, where a
 //! node is in several contacts or meshes do not match.
 //!
-//! Rows are unit vectors unless stiffness jumps. Where it does a row is as long as the root of the stiffness it works against,
-//! relative to the largest: the orthogonal projector onto multipliers in balance then is the one with a diagonal `Q` of Klawonn
-//! and Widlund (Comm. Pure Appl. Math. 54, 2001), without which iterations grow with the jump. Copies of a node are glued the
-//! stiff ones first, so that stiff ones are not glued by way of a soft one.
+//! Rows are unit vectors unless stiffness jumps. Where it does, the length of a row is the root of the stiffness it works
+//! against, relative to the largest. The orthogonal projector onto multipliers in balance then equals the projector with a
+//! diagonal `Q` of Klawonn and Widlund (Comm. Pure Appl. Math. 54, 2001); without it iterations grow with the jump. Of the
+//! copies of a node the stiffest are glued first, so that no two stiff copies are joined through a soft one.
 //!
 //! Rows that share a node form a *block*: the gluing and support rows of a node, together with those of the nodes
 //! that contact, or short edges ([`ties`]), tie to it. A rank holds every row of every block that one of its
@@ -19,6 +19,7 @@ pub mod components;
 pub mod contact;
 pub mod dirichlet;
 pub mod gluing;
+pub mod law;
 pub mod ties;
 
 use std::ops::Range;
@@ -39,7 +40,7 @@ pub enum Kind {
         /// Component.
         axis: usize,
     },
-    /// Two surfaces do not penetrate: the multiplier is at least zero.
+    /// Two surfaces do not penetrate.
     Contact {
         /// Index of the contact pair.
         pair: usize,
@@ -59,32 +60,39 @@ pub struct Term {
     pub value: f64,
 }
 
-/// One row: `sum of terms = rhs`, or `<= rhs` for contact.
+/// One row: `sum of terms = rhs`, or `<= rhs` for contact ([`law`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// What it stands for.
     pub kind: Kind,
     /// Right-hand side (length, times `scale`).
     pub rhs: f64,
-    /// Factor that made the row as long as it is: physical nodal force = `scale` times multiplier.
+    /// Factor that gave the row its length: force (force) = `scale` times multiplier, distance (length) = slack / `scale`.
     pub scale: f64,
     /// Length of the row.
     pub length: f64,
     /// Its coefficients.
     pub terms: Vec<Term>,
-    /// Components of a contact's condition that supports fix, which are part of the right-hand side.
-    pub held: Vec<Held>,
+    /// Components of a contact's condition that supports fix. They are part of the right-hand side.
+    pub fixed: Vec<Fixed>,
 }
 
 /// A component of a contact's condition that a support fixes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Held {
+pub struct Fixed {
     /// Index of the support in the scene.
     pub support: usize,
     /// Component.
     pub axis: usize,
     /// Its coefficient in the condition; the support takes as much of the contact force.
     pub weight: f64,
+}
+
+impl Kind {
+    /// Whether the row is of a contact: its force is one that surfaces exert on each other.
+    pub fn is_contact(self) -> bool {
+        matches!(self, Self::Contact { .. })
+    }
 }
 
 impl Term {
@@ -94,15 +102,15 @@ impl Term {
     }
 }
 
-/// Jumps of stiffness below this change nothing.
+/// Ratio of stiffness from which rows are not unit vectors.
 const JUMP: f64 = 16.0;
 
-/// Beyond this jump rows get no shorter: the coarse problem knows the squares of their lengths to sixteen digits only.
+/// Least relative stiffness that a row's length follows: the coarse problem has sixteen digits for the squared lengths.
 const SOFTEST: f64 = 1e-9;
 
 impl Row {
-    /// Makes a unit vector as long as the root of the stiffness it works against, relative to the largest and up to a power of
-    /// two and to [`SOFTEST`], given that of all subdomains and the largest of these.
+    /// Gives a unit vector its length: the root of the stiffness it works against over the largest stiffness, rounded to a
+    /// power of two and at least the root of [`SOFTEST`]. Given are the stiffness of all subdomains and the largest of them.
     fn weigh(&mut self, stiffness: &[f64], largest: f64) {
         let flexibility: f64 = self.terms.iter().map(|t| t.value * t.value / stiffness[t.subdomain as usize]).sum();
         let relative = (1.0 / (flexibility * largest)).max(SOFTEST);
@@ -112,11 +120,6 @@ impl Row {
             self.scale *= self.length;
             self.terms.iter_mut().for_each(|term| term.value *= self.length);
         }
-    }
-
-    /// Whether the multiplier is bounded below by zero.
-    pub fn is_inequality(&self) -> bool {
-        matches!(self.kind, Kind::Contact { .. })
     }
 }
 
@@ -168,8 +171,8 @@ pub struct Constraints {
     pub uneven: bool,
     /// Nodes that short edges tie together.
     pub ties: Ties,
-    /// Contact pairs of own nodes without a row, because supports fix all of their nodes along the normal, and the distance
-    /// that is left (length).
+    /// Contact pairs of own nodes without a row, as supports fix all their nodes along the normal: index of the pair and the
+    /// distance that is left (length).
     pub idle: Vec<(usize, f64)>,
 }
 

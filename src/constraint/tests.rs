@@ -68,7 +68,7 @@ fn rows_of_meshes_that_do_not_match_are_unit_vectors_and_independent() {
             assert!((0..b.nrows()).all(|row| (gram[(row, row)] - 1.0).abs() < 1e-14));
             let eigenvalues = gram.self_adjoint_eigenvalues(faer::Side::Lower).expect("they exist");
             assert!(eigenvalues[0] > 1e-3, "{sets:?}: {}", eigenvalues[0]);
-            (0..b.nrows()).filter(|&row| setup.rows()[row].is_inequality()).count()
+            (0..b.nrows()).filter(|&row| !setup.rows()[row].law().always_holds()).count()
         };
         let contacts = on_ranks(&not_matching(sets), 1, independent)[0];
         // Nodes of the slave surface over the master: 4 of 5 columns, less the one that is held.
@@ -195,8 +195,8 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
     let square: f64 = row.terms.iter().map(|t| t.value * t.value).sum();
     assert!((square - 1.0).abs() < 1e-15);
     assert!((row.rhs - row.scale * (0.5 - 0.6 * 0.25 + 0.75 * 0.6 * 0.25)).abs() < 1e-15);
-    let held: Vec<_> = row.held.iter().map(|h| (h.support, h.axis, h.weight)).collect();
-    assert_eq!(held, [(0, 0, 0.6), (0, 0, -0.75 * 0.6)]);
+    let fixed: Vec<_> = row.fixed.iter().map(|h| (h.support, h.axis, h.weight)).collect();
+    assert_eq!(fixed, [(0, 0, 0.6), (0, 0, -0.75 * 0.6)]);
     let expected = [
         (6, [0.5 * 0.6, 0.0, 0.5 * 0.8]),
         (7, [0.0, 0.0, 0.8]),
@@ -230,7 +230,7 @@ fn of_contacts_in_one_direction_the_tightest_counts() {
 }
 
 #[test]
-fn what_supports_hold_is_told_of_every_node_that_is_asked_for() {
+fn components_that_supports_fix_are_known_at_every_node_that_is_asked_for() {
     for ranks in RANKS {
         on_ranks(&two_bricks(&[]), ranks, |setup| {
             let (supports, decomposition) = (&setup.discrete.supports, &setup.discrete.decomposition);
@@ -238,7 +238,7 @@ fn what_supports_hold_is_told_of_every_node_that_is_asked_for() {
             let mine: Vec<u64> = decomposition.interface.iter().filter(fixed).map(|node| node.node).collect();
             let some = all_gather_u64(setup.comm, &mine).into_iter().min().expect("supports hold some");
             let found =
-                dirichlet::held(setup.comm, &decomposition.interface, supports, &[some, some, some + 1_000_000]);
+                dirichlet::fixed_at(setup.comm, &decomposition.interface, supports, &[some, some, some + 1_000_000]);
             assert_eq!(found[0], found[1]);
             assert!(found[0] != [false; 3] && found[2] == [false; 3]);
         });

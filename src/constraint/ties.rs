@@ -1,8 +1,8 @@
 //! Groups of nodes that short edges tie together.
 //!
-//! In flat or needle-like elements the ends of a short edge hardly move against each other. Where some of them are on a
-//! boundary, forces on one move all, and what is known of one alone (the diagonal of the stiffness) says nothing of how
-//! easily it gives way. So the scaling of the preconditioner takes them together, and their rows are in one block.
+//! In flat or needle-like elements the ends of a short edge hardly move against each other. A force on one end moves both,
+//! so the diagonal of the stiffness at one node is far larger than its resistance. The scaling of the preconditioner
+//! therefore treats such nodes as a group, and their rows are in one block.
 
 use std::collections::HashMap;
 
@@ -11,10 +11,10 @@ use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::{Decomposition, Subdomain};
 use crate::mesh::Elements;
 
-/// An edge is short if the longest one of its element is more than so many times as long. (In a cube cut into tetrahedra it
-/// is 1.7 times.)
+/// An edge is short if the longest edge of its element is more than this many times as long (1.7 times in a cube cut into
+/// tetrahedra).
 const SHORT: f64 = 4.0;
-/// Larger groups are left alone: they would make larger problems than they save.
+/// Larger groups are not formed: their dense blocks would cost more than they save.
 const MOST: usize = 32;
 
 /// A group of an own subdomain.

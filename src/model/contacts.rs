@@ -38,7 +38,7 @@ pub(super) fn pair(
     index: impl Fn(&SurfaceName) -> usize,
 ) -> Result<Paired, ContactError> {
     let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
-    let held = |nodes: &[u64]| dirichlet::held(comm, &decomposition.interface, supports, nodes);
+    let held = |nodes: &[u64]| dirichlet::fixed_at(comm, &decomposition.interface, supports, nodes);
     let mut all = Paired::default();
     for (number, (name, contact)) in scene.contact.iter().enumerate() {
         let surfaces: Vec<(&SurfaceName, GatheredSurface)> = contact.surfaces().map(|s| (s, gather(s))).collect();

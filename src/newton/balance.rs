@@ -1,9 +1,9 @@
-//! Forces and moments on each body: what a run found must be in balance, seen from outside.
+//! Forces and moments on each body, whose sums must be zero.
 //!
-//! Loads, reactions of supports and contact forces on a body add up to nothing, and so do their moments (about the mean of its
-//! nodes), whatever happens inside. They are summed from nodal forces: `f`, what supports take of `f - F(u) - B_I'lambda_I`,
-//! and `-B_I'lambda_I`. Where a support holds a component of a contact's condition, the support takes that part of the contact
-//! force at once: it is in neither of the two.
+//! Loads, reactions of supports and contact forces on a body add up to zero, and so do their moments about the mean of its
+//! nodes, whatever the body is made of. They are summed from nodal forces: loads `f`, reactions (the part of
+//! `f - F(u) - B_I'lambda_I` along support rows, reversed) and contact forces `-B_I'lambda_I`. Where a support fixes a
+//! component of a contact's condition, that part of the contact force acts on the support and is in neither sum.
 
 use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::constraint::Kind;
@@ -32,8 +32,8 @@ impl BodyBalance {
     }
 }
 
-/// The largest unbalanced force of a body over the largest sum of nodal forces on one, or moment over that at the radius of the
-/// body; `least` is what forces are compared with at least.
+/// The largest unbalanced force of a body, or moment over its radius, over the largest gross force of a body. That is taken
+/// as `least` (force) if it is smaller.
 pub fn relative(bodies: &[BodyBalance], least: f64) -> f64 {
     let size = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let scale = bodies.iter().fold(least, |largest, body| largest.max(body.gross));
@@ -52,8 +52,8 @@ impl TornProblem<'_> {
     /// What acts on each of so many bodies, and the largest imbalance, relative. Two collectives and a neighbour exchange.
     pub fn balance(&self, state: &State, lambda: &[f64], bodies: usize) -> (Vec<BodyBalance>, f64) {
         let contacts = self.against(&self.of_contact(lambda));
-        let held = |kind| matches!(kind, Kind::Support { .. });
-        let supports = self.against(&self.along(&self.unbalanced(state, lambda), held));
+        let of_supports = |kind| matches!(kind, Kind::Support { .. });
+        let supports = self.against(&self.along(&self.unbalanced(state, lambda), of_supports));
         let centres = self.centres(bodies);
         let mut partial = vec![0.0; NUMBERS * bodies * self.subdomains.len()];
         for (own, sums) in partial.chunks_exact_mut((NUMBERS * bodies).max(1)).enumerate() {
@@ -83,7 +83,7 @@ impl TornProblem<'_> {
             radius: (numbers[19] / nodes).sqrt(),
         };
         let found: Vec<BodyBalance> = sums.chunks_exact(NUMBERS).zip(&centres).map(of_body).collect();
-        // As residuals are: after an unloading, with the forces that were there.
+        // As for residuals: after an unloading, relative to the forces before.
         let before = self.committed.sizes.force_square.sqrt();
         let relative = relative(&found, before.max(SIGNIFICANT * state.terms.force_squares.sqrt()));
         (found, relative)

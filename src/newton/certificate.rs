@@ -50,7 +50,7 @@ const SHARP: f64 = 0.05;
 const FACTORS: f64 = 0.01;
 /// Contact forces below this share of the largest, and forces out of balance below this share of all, are rounding.
 const ROUNDING: f64 = 1e-12;
-/// Attempts to balance multipliers without pulling.
+/// Attempts to find multipliers that are admissible and in balance.
 const BALANCINGS: usize = 10;
 
 /// A bound on `J(u) - min J`.
@@ -71,6 +71,57 @@ impl Certificate {
     }
 }
 
+/// The displacement `v` that the bound is computed from, and what belongs to it.
+struct Trial {
+    /// `v`.
+    v: Torn,
+    /// `u - v`.
+    change: Torn,
+    /// `rho = f - B'lambda - F(v)`.
+    rho: Torn,
+}
+
+impl Trial {
+    /// `v = u`.
+    fn at(problem: &TornProblem, (u, state): (&Torn, &State), lambda: &[f64]) -> Self {
+        let mut rho = problem.unbalance(state);
+        problem.gather.add_transpose(-1.0, lambda, &mut rho);
+        Self { v: u.clone(), change: problem.gather.zeros(), rho }
+    }
+
+    /// For each own subdomain: `Psi(u) - Psi(v) - F(v)'(u - v)` (zero at `v = u`), `rho'(v - u)`, `rho'K^+ rho`, and this over
+    /// `r`. `correction` is `K^+ rho`.
+    fn terms(&self, problem: &TornProblem, correction: &Torn, is_at_u: bool) -> Vec<f64> {
+        let Self { v, change, rho } = self;
+        let mut terms = Vec::with_capacity(4 * v.len());
+        for (own, subdomain) in problem.subdomains.iter().enumerate() {
+            let (material, history) = (&problem.materials[own], problem.committed.history(own));
+            let moved =
+                if is_at_u { 0.0 } else { internal::divergence(subdomain, material, history, &v[own], &change[own]) };
+            let worked = -dot(&rho[own], &change[own]);
+            let square = (1.0 + FACTORS) * dot(&rho[own], &correction[own]);
+            let weighted = if square > 0.0 { square / material.least_tangent() } else { 0.0 };
+            terms.extend([moved, worked, square, weighted]);
+        }
+        terms
+    }
+
+    /// Goes on to `v + correction`.
+    fn advance(&mut self, problem: &TornProblem, lambda: &[f64], correction: &Torn) {
+        let Self { v, change, rho } = self;
+        for (own, subdomain) in problem.subdomains.iter().enumerate() {
+            v[own].iter_mut().zip(&correction[own]).for_each(|(v, c)| *v += c);
+            change[own].iter_mut().zip(&correction[own]).for_each(|(d, c)| *d -= c);
+            let (material, history) = (&problem.materials[own], problem.committed.history(own));
+            let mut forces = vec![0.0; v[own].len()];
+            internal::add_forces(subdomain, material, history, &v[own], &mut forces);
+            rho[own].clone_from(&problem.loads[own]);
+            rho[own].iter_mut().zip(forces).for_each(|(r, f)| *r -= f);
+        }
+        problem.gather.add_transpose(-1.0, lambda, rho);
+    }
+}
+
 impl StepSolver<'_> {
     /// Bounds `J(u) - min J` for an admissible `u`, by the multipliers of the last step and its factors. Collective.
     pub fn certify(
@@ -80,44 +131,26 @@ impl StepSolver<'_> {
         lambda: &[f64],
         timer: &Timer,
     ) -> Certificate {
-        let (mut lambda, balanced) = timer.time("coarse problem", || self.balance(problem, lambda));
+        // Admissible multipliers that balance the loads on every subdomain.
+        let (mut lambda, balanced) = timer.time("coarse problem", || self.equilibrate(problem, lambda));
         if self.operator.is_hybrid() {
             let mut torn = problem.unbalance(state);
             problem.gather.add_transpose(-1.0, &lambda, &mut torn);
             timer.time("certificate", || self.operator.invert(&mut torn));
             self.add_bonds(problem, [&mut lambda]);
         }
-        let pull: Vec<f64> = lambda
-            .iter()
-            .zip(&problem.constraints.rows)
-            .map(|(l, row)| l * f64::from(u8::from(row.is_inequality())))
-            .collect();
-        let open = problem.space.dots(&[(&pull, &problem.slack(u))])[0].max(0.0);
+        // lambda_I'(c - B u)_I.
+        let open = problem.space.dots(&[(&problem.of_contact(&lambda), &problem.slack(u))])[0].max(0.0);
 
-        let (mut v, mut change) = (u.clone(), problem.gather.zeros());
-        let mut rho = problem.unbalance(state);
-        problem.gather.add_transpose(-1.0, &lambda, &mut rho);
+        let mut trial = Trial::at(problem, (u, state), &lambda);
         let mut best = Certificate { gap: f64::INFINITY, is_bound: balanced, solves: 0 };
         let mut estimate = f64::INFINITY;
         for solves in 1..=TURNS {
-            let mut correction = rho.clone();
+            // The other three terms at v; the last one with r = 1 is the least that knowing r could make of it.
+            let mut correction = trial.rho.clone();
             timer.time("certificate", || self.operator.factors.solve(&mut correction));
-            let mut partial = Vec::with_capacity(4 * u.len());
-            timer.time("certificate", || {
-                for (own, subdomain) in problem.subdomains.iter().enumerate() {
-                    let (material, history) = (&problem.materials[own], problem.committed.history(own));
-                    let moved = if solves == 1 {
-                        0.0
-                    } else {
-                        internal::divergence(subdomain, material, history, &v[own], &change[own])
-                    };
-                    let worked = -dot(&rho[own], &change[own]);
-                    let square = (1.0 + FACTORS) * dot(&rho[own], &correction[own]);
-                    let weighted = if square > 0.0 { square / material.least_tangent() } else { 0.0 };
-                    partial.extend([moved, worked, square, weighted]);
-                }
-            });
-            let sum = problem.space.sum(&partial, 4);
+            let terms = timer.time("certificate", || trial.terms(problem, &correction, solves == 1));
+            let sum = problem.space.sum(&terms, 4);
             let known = open + sum[0] + sum[1].max(0.0);
             let (least, most) = (known + 0.5 * sum[2], known + 0.5 * sum[3]);
             best.solves = solves;
@@ -126,18 +159,8 @@ impl StepSolver<'_> {
             if most - least <= SHARP * most || !least.is_finite() {
                 break;
             }
-            timer.time("certificate", || {
-                for (own, subdomain) in problem.subdomains.iter().enumerate() {
-                    v[own].iter_mut().zip(&correction[own]).for_each(|(v, c)| *v += c);
-                    change[own].iter_mut().zip(&correction[own]).for_each(|(d, c)| *d -= c);
-                    let (material, history) = (&problem.materials[own], problem.committed.history(own));
-                    let mut forces = vec![0.0; v[own].len()];
-                    internal::add_forces(subdomain, material, history, &v[own], &mut forces);
-                    rho[own].clone_from(&problem.loads[own]);
-                    rho[own].iter_mut().zip(forces).for_each(|(r, f)| *r -= f);
-                }
-                problem.gather.add_transpose(-1.0, &lambda, &mut rho);
-            });
+            // v = v + K^+ rho.
+            timer.time("certificate", || trial.advance(problem, &lambda, &correction));
         }
         if !best.gap.is_finite() {
             (best.gap, best.is_bound) = (estimate, false);
@@ -145,28 +168,24 @@ impl StepSolver<'_> {
         best
     }
 
-    /// The nearest multipliers, or nearly so, that balance the loads on every subdomain and do not pull; and whether they do,
-    /// up to rounding.
-    fn balance(&self, problem: &TornProblem, lambda: &[f64]) -> (Vec<f64>, bool) {
+    /// Admissible multipliers near the given ones that balance the loads on every subdomain (`R'(f - B'lambda) = 0`), and
+    /// whether they are both, up to rounding. Alternates between the two conditions.
+    fn equilibrate(&self, problem: &TornProblem, lambda: &[f64]) -> (Vec<f64>, bool) {
         let coarse = &self.projector.coarse;
         let wanted = recover::resultants(problem.subdomains, problem.modes, coarse, &problem.loads);
-        let is_contact = |row: usize| problem.constraints.rows[row].is_inequality();
+        let laws = problem.constraints.laws();
         let largest = |mine: f64| problem.space.maximum(mine);
         let mut lambda = lambda.to_vec();
         for attempt in 0..BALANCINGS {
-            let contacts = lambda.iter_mut().enumerate().filter(|(row, _)| is_contact(*row));
-            let most = largest(contacts.fold(0.0, |most, (_, l)| {
-                *l = l.max(0.0);
-                most.max(*l)
-            }));
+            laws.project(&mut lambda);
+            let most = largest(problem.of_contact(&lambda).iter().fold(0.0, |most, l| most.max(l.abs())));
             let missing: Vec<f64> = wanted.iter().zip(coarse.apply(&lambda)).map(|(e, g)| e - g).collect();
             let fresh;
             // The rows of the last step have a factor.
-            let face = match self.programs.held().filter(|_| attempt == 0) {
+            let face = match self.programs.face().filter(|_| attempt == 0) {
                 Some(face) => face,
                 None => {
-                    let held = (0..lambda.len()).map(|row| !is_contact(row) || lambda[row] > ROUNDING * most);
-                    match CoarseFace::new(coarse, held.collect()) {
+                    match CoarseFace::new(coarse, laws.kept(&lambda, ROUNDING * most)) {
                         Ok(face) => fresh = face,
                         Err(_) => return (lambda, false),
                     }
@@ -174,8 +193,7 @@ impl StepSolver<'_> {
                 }
             };
             face.add_balance(coarse, missing, &mut lambda);
-            let contacts = lambda.iter().enumerate().filter(|(row, _)| is_contact(*row));
-            if largest(contacts.fold(0.0, |pull, (_, l)| pull.max(-l))) <= ROUNDING * most {
+            if largest(laws.distance(&lambda)) <= ROUNDING * most {
                 let norm = |squares: f64| squares.sqrt();
                 let left = norm(wanted.iter().zip(coarse.apply(&lambda)).map(|(e, g)| (e - g).powi(2)).sum());
                 let size = norm(problem.space.dots(&[(&lambda, &lambda)])[0]).max(norm(dot(&wanted, &wanted)));

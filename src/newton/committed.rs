@@ -1,4 +1,4 @@
-//! What converged increments leave behind: the history of the material, and how large everything has been.
+//! What converged increments leave: the history of the material, and the largest sizes so far.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,11 +12,11 @@ use crate::material::History;
 pub struct Committed {
     /// History of each integration point of each own subdomain; none where nothing ever yielded.
     pub histories: Vec<Vec<History>>,
-    /// What relative errors refer to where less is left.
+    /// Least sizes that relative errors refer to.
     pub sizes: Sizes,
 }
 
-/// The largest values of the increments so far. An unloaded body keeps errors of the size of what was there.
+/// The largest values of the increments so far. After an unloading errors are of the size of the values before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sizes {
     /// `|u|_e` (root of energy).

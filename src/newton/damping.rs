@@ -52,7 +52,7 @@ pub fn search(
         return Some(full);
     }
     let first_slope = problem.slope(state, du);
-    // Below this, energies differ by round-off only.
+    // Round-off in the difference of two energies.
     let cancelled = ROUNDING * full.state.terms.energy.sqrt();
     let noise = 1e-12
         * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs())
@@ -61,6 +61,7 @@ pub fn search(
     if lowers(&full) {
         return Some(full);
     }
+    // Illinois: the slope changes its sign between low and high, (length, slope) each.
     let mut low = (0.0, first_slope);
     let mut high = (1.0, problem.slope(&full.state, du));
     for _ in 0..TRIALS {

@@ -38,7 +38,7 @@ pub struct Dual<'s, 'a> {
     pub space: &'s RowSpace<'s>,
     /// Where the time goes.
     pub timer: &'s Timer,
-    /// Told the applications of F so far.
+    /// Called after each application of F with the number so far.
     pub alive: &'s dyn Fn(usize),
 }
 
@@ -55,8 +55,8 @@ impl<'a> Dual<'_, 'a> {
         }
     }
 
-    /// The parts of `x'x`, of `x` with each of `against`, and of `pairs`, that count for each own subdomain; how many products
-    /// these are.
+    /// Contributions of each own subdomain to `x'x`, to the products of `x` with each of `against`, and to those of `pairs`; and
+    /// the number of products.
     fn partial(&self, x: &[f64], against: &[&[f64]], pairs: &[(&[f64], &[f64])]) -> (Vec<f64>, usize) {
         let mut all = vec![(x, x)];
         all.extend(against.iter().map(|other| (x, *other)));
@@ -105,13 +105,13 @@ pub struct DualFace<'s, 'a> {
     pub dual: Dual<'s, 'a>,
     /// The rows of B.
     pub constraints: &'s Constraints,
-    /// `e`, whole on every rank.
-    pub balance: &'s [f64],
+    /// `e = R'f_k`, whole on every rank.
+    pub resultants: &'s [f64],
     /// The rows of the set.
     pub rows: CoarseFace,
 }
 
-/// A contact that a motion closes by less than this share of what it moves elsewhere does not resist it.
+/// A contact resists a motion if this changes `B u` there by more than this share of the largest change in any row.
 const RESISTS: f64 = 1e-9;
 
 impl DualFace<'_, '_> {
@@ -119,16 +119,18 @@ impl DualFace<'_, '_> {
         &self.dual.projector.coarse
     }
 
-    /// Takes contacts in that resist what the rows of the set cannot balance, until nothing is left of it; false if none
-    /// resists.
+    /// Adds contacts until the rows of the set can balance `e`: while a free motion is left that `e` drives, those that resist
+    /// it. False if none resists.
     pub fn complete(&mut self, kept: &mut [bool]) -> bool {
-        let size = self.balance.iter().map(|e| e * e).sum::<f64>().sqrt();
-        while let Some(motion) = self.rows.unbalanced(self.balance, size) {
+        let size = self.resultants.iter().map(|e| e * e).sum::<f64>().sqrt();
+        while let Some(motion) = self.rows.unbalanced(self.resultants, size) {
             let moved = self.coarse().moved(&motion);
             let most = self.dual.space.maximum(moved.iter().fold(0.0, |most, m| most.max(m.abs())));
             let mut joined = 0.0;
-            for (kept, _) in kept.iter_mut().zip(&moved).filter(|(kept, m)| !**kept && **m > RESISTS * most) {
-                (*kept, joined) = (true, 1.0);
+            for ((kept, row), &moved) in kept.iter_mut().zip(&self.constraints.rows).zip(&moved) {
+                if !*kept && row.law().resists(moved, RESISTS * most) {
+                    (*kept, joined) = (true, 1.0);
+                }
             }
             if self.dual.space.maximum(joined) == 0.0 {
                 return false;
@@ -187,8 +189,8 @@ impl Face for DualFace<'_, '_> {
     fn restore(&mut self, x: &mut [f64]) {
         self.dual.timer.time("coarse problem", || {
             self.rows.mask(x);
-            let balance = self.coarse().apply(x);
-            let missing = self.balance.iter().zip(balance).map(|(e, b)| e - b).collect();
+            let present = self.coarse().apply(x);
+            let missing = self.resultants.iter().zip(present).map(|(e, b)| e - b).collect();
             self.rows.add_balance(self.coarse(), missing, x);
         });
     }

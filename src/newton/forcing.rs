@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 const FIRST: f64 = 0.01;
 /// The least reduction in later steps.
 pub const LOOSEST: f64 = 0.03;
-/// The most that is asked for: quadratic convergence gains nothing beyond, and factors in single precision can do it.
+/// The strongest reduction: more would not speed Newton's method up, and factors in single precision allow this one.
 pub const TIGHTEST: f64 = 1e-4;
 /// Factor on the squared decrease of the residual.
 const SHARE: f64 = 0.5;
@@ -24,8 +24,8 @@ pub struct Forcing {
     pub drop: f64,
     /// ... but not below the scene's tolerance times this.
     pub floor: f64,
-    /// Reduction of the true residual that is left to do. A tangent whose entries have changed by less, relative to its
-    /// diagonal, may stand for the new one: Newton's method converges at that rate at least.
+    /// Reduction of the true residual that is still needed. A tangent whose entries have changed by less, relative to its
+    /// diagonal, is not renewed: Newton's method with the old one converges at that rate at least.
     pub left: f64,
 }
 

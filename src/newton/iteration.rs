@@ -189,7 +189,7 @@ impl<'a> Newton<'a> {
         let began = timer.total_seconds();
         let mut refused = Vec::new();
         let (step, damped) = loop {
-            match self.trial(refused.len(), timer, alive) {
+            match self.trial(&refused, timer, alive) {
                 Trial::Accepted(step, damped) => break (step, damped),
                 Trial::Refused(step) => refused.push(step),
                 Trial::Ended(outcome) => {
@@ -227,7 +227,7 @@ impl<'a> Newton<'a> {
     }
 
     /// Tries a step: solves the quadratic program of the tangents at the iterate, and looks for a length that lowers `J`.
-    fn trial(&mut self, refused: usize, timer: &Timer, alive: &dyn Fn(usize, usize)) -> Trial {
+    fn trial(&mut self, refused: &[Step], timer: &Timer, alive: &dyn Fn(usize, usize)) -> Trial {
         let Self { problem, solver, iterate, forcing, steps, .. } = self;
         let own = &steps[self.before..];
         // Where rounding spoiled the last step factors have to be in double precision.
@@ -239,7 +239,8 @@ impl<'a> Newton<'a> {
         }
         let number = own.len() + 1;
         let at = (&iterate.u, &iterate.state);
-        let step = match solver.solve(problem, at, *forcing, timer, &|applications| alive(number, applications)) {
+        let last = refused.last().map_or(&iterate.lambda, |trial| &trial.lambda);
+        let step = match solver.solve(problem, at, last, *forcing, timer, &|applications| alive(number, applications)) {
             Ok(step) => step,
             Err(message) => return Trial::Ended(Outcome::Singular(message)),
         };
@@ -256,7 +257,7 @@ impl<'a> Newton<'a> {
         match damping::search(problem, at.0, at.1, &step.du, self.admissible, timer) {
             Some(damped) => Trial::Accepted(step, damped),
             None if !iterate.state.energy.is_finite() => Trial::Ended(Outcome::NotFinite),
-            None if refused >= TRIALS => Trial::Ended(Outcome::Stalled),
+            None if refused.len() >= TRIALS => Trial::Ended(Outcome::Stalled),
             None => {
                 // Perhaps the program was solved too loosely for a descent direction.
                 forcing.tighten();
@@ -344,7 +345,7 @@ impl<'a> Newton<'a> {
         Conditions { loads: problem.loads, rhs: problem.rhs } = path.conditions(attempt);
         let lambda = vec![0.0; problem.gather.rows()];
         let (u, held) = match &self.reached {
-            Some(reached) => (reached.u.clone(), Some(problem.active_rows(&reached.lambda))),
+            Some(reached) => (reached.u.clone(), Some(problem.constraints.laws().kept(&reached.lambda, 0.0))),
             None => (problem.gather.zeros(), None),
         };
         let (iterate, outcome) = first_iterate(problem, solver, (u, lambda), held, None, timer);
@@ -372,7 +373,7 @@ fn first_iterate(
 ) -> (Iterate, Option<Outcome>) {
     let state = problem.evaluate(&u);
     let refusal = match stood {
-        Some(stood) => solver.resume(problem, stood, &lambda, timer).err(),
+        Some(stood) => solver.resume(problem, stood, timer).err(),
         None => {
             solver.begin();
             None

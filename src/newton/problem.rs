@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use super::committed::Committed;
 use crate::assembly::Region;
 use crate::assembly::internal::{self, Terms};
-use crate::constraint::{Constraints, Kind};
+use crate::constraint::Constraints;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
@@ -30,7 +30,7 @@ pub struct TornProblem<'a> {
     pub loads: Torn,
     /// `c`: right-hand sides of the rows.
     pub rhs: Vec<f64>,
-    /// What former increments of the load left behind.
+    /// State that former increments left.
     pub committed: Committed,
     /// The rows of B.
     pub constraints: &'a Constraints,
@@ -60,12 +60,12 @@ pub struct State {
     pub plastic: usize,
     /// Elements of each own subdomain that yield.
     pub yielding: Vec<usize>,
-    /// What could cancel in forces and energies.
+    /// Sizes of the terms that forces and energies are sums of.
     pub terms: Terms,
 }
 
-/// Energies and forces are compared with those that are there, and at least with this share of the terms that they are
-/// sums of (in the energy norm, of its root): where bodies move without strain, all that is there is round-off.
+/// Least size that energies and forces are relative to, as a share of the terms that they are sums of (in the energy norm,
+/// of their root). Bodies that move without strain have nothing but round-off in these sums.
 pub(super) const SIGNIFICANT: f64 = 1e-8;
 
 impl<'a> TornProblem<'a> {
@@ -179,42 +179,28 @@ impl TornProblem<'_> {
         slack
     }
 
-    /// The part of the slack that violates its constraint.
-    fn violated(&self, mut slack: Vec<f64>) -> Vec<f64> {
-        for (s, row) in slack.iter_mut().zip(&self.constraints.rows) {
-            if row.is_inequality() {
-                *s = s.min(0.0);
-            }
-        }
-        slack
-    }
-
-    /// Corrects a displacement by `B'` until it is admissible. Where rows are orthogonal that is the projection.
+    /// Adds `B'x` to a displacement that makes it admissible. Where rows are orthogonal that is the projection.
     pub fn make_admissible(&self, u: &mut Torn) {
         let slack = self.slack(u);
-        let mut correction = self.violated(slack.clone());
-        self.coupling.borrow_mut().close(&slack, &mut correction);
+        let mut correction = slack.clone();
+        self.constraints.laws().violation(&mut correction);
+        self.coupling.borrow_mut().close(self.constraints, &slack, &mut correction);
         self.gather.add_transpose(1.0, &correction, u);
     }
 
     /// Whether a displacement satisfies all constraints to round-off.
     pub fn is_admissible(&self, u: &Torn) -> bool {
-        let violation = self.violated(self.slack(u));
+        let mut violation = self.slack(u);
+        self.constraints.laws().violation(&mut violation);
         let squares = self.space.dots(&[(&violation, &violation), (&self.rhs, &self.rhs)]);
         squares[0] <= f64::EPSILON * squares[1]
     }
 
-    /// Rows that act with these multipliers: all equalities, and the contacts that press.
-    pub fn active_rows(&self, lambda: &[f64]) -> Vec<bool> {
-        let rows = self.constraints.rows.iter().zip(lambda);
-        rows.map(|(row, &lambda)| !row.is_inequality() || lambda > 0.0).collect()
-    }
-
-    /// Number of contact rows with a positive multiplier. One collective.
+    /// Number of contact rows that are closed. One collective.
     pub fn active_contacts(&self, lambda: &[f64]) -> usize {
         let active = |row: u32| {
-            let kind = self.constraints.rows[row as usize].kind;
-            matches!(kind, Kind::Contact { .. }) && lambda[row as usize] > 0.0
+            let of = &self.constraints.rows[row as usize];
+            of.kind.is_contact() && of.law().status(lambda[row as usize]).is_closed()
         };
         let partial: Vec<f64> =
             self.space.owned().iter().map(|rows| rows.iter().filter(|&&row| active(row)).count() as f64).collect();

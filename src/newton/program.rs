@@ -11,7 +11,7 @@ use super::problem::TornProblem;
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::projector::Projector;
 use crate::feti::coarse::{Coarse, Floating};
-use crate::qp::bounds::Bounds;
+use crate::qp::feasible::FeasibleSet;
 use crate::qp::mprgp::Expansion;
 use crate::qp::pcpg::Pcpg;
 use crate::qp::quadratic::{Projection, Space};
@@ -39,17 +39,17 @@ pub struct ProgramSettings {
 
 /// Where a program starts.
 pub struct Warm {
-    /// `e`, whole on every rank.
-    pub balance: Vec<f64>,
+    /// `e = R'f_k`: forces and moments on all clusters, whole on every rank.
+    pub resultants: Vec<f64>,
     /// Multipliers with `G l = e`.
     pub lambda: Vec<f64>,
 }
 
 /// Its solution.
 pub struct Found {
-    /// Multipliers, not negative where bounded.
+    /// Admissible multipliers (the laws of the rows hold exactly, `G l = e` to the tolerance).
     pub lambda: Vec<f64>,
-    /// The same to the tolerance of the program, with `G l = e` to round-off.
+    /// Multipliers with `G l = e` to round-off, admissible to the tolerance.
     pub balanced: Vec<f64>,
     /// How it ended.
     pub outcome: Outcome,
@@ -59,10 +59,10 @@ pub struct Found {
     pub at_floor: bool,
 }
 
-/// What later programs depend on, but for the multipliers.
+/// What later programs depend on, beside the last multipliers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProgramState {
-    /// The rows that the last program's multipliers act on.
+    /// Rows that the last program kept: its multipliers are zero elsewhere. `None`: the next one starts from scratch.
     pub kept: Option<Vec<bool>>,
     /// The largest first residual of a solve so far.
     pub reference: Option<f64>,
@@ -72,11 +72,11 @@ pub struct ProgramState {
     pub norm: Option<f64>,
 }
 
-/// The solvers with what is kept from step to step.
+/// The solvers with what they carry from step to step. The multipliers themselves belong to the caller.
 pub struct Programs {
     settings: ProgramSettings,
-    /// Multipliers of the last step, and the coarse problem of the rows that they act on.
-    last: Option<(Vec<f64>, CoarseFace)>,
+    /// Coarse problem of the rows that the last program kept. `None`: the next one starts from scratch.
+    face: Option<CoarseFace>,
     /// The largest first residual of a solve so far.
     reference: Option<f64>,
     /// Whether the next program is the first of a solve.
@@ -87,21 +87,21 @@ pub struct Programs {
 impl Programs {
     /// Nothing is known yet.
     pub fn new(settings: ProgramSettings) -> Self {
-        Self { settings, last: None, reference: None, first: true, norm: None }
+        Self { settings, face: None, reference: None, first: true, norm: None }
     }
 
     /// What the next programs depend on.
     pub fn state(&self) -> ProgramState {
-        let kept = self.held().map(|face| face.kept().to_vec());
+        let kept = self.face().map(|face| face.kept().to_vec());
         ProgramState { kept, reference: self.reference, first: self.first, norm: self.norm }
     }
 
-    /// Goes on from such a state, with the multipliers that belong to it. Collective.
-    pub fn resume(&mut self, coarse: &Coarse, state: ProgramState, lambda: &[f64]) {
+    /// Goes on from such a state. Collective.
+    pub fn resume(&mut self, coarse: &Coarse, state: ProgramState) {
         (self.reference, self.first, self.norm) = (state.reference, state.first, state.norm);
-        self.last = None;
+        self.face = None;
         if let Some(kept) = state.kept {
-            self.expect(coarse, lambda, kept);
+            self.expect(coarse, kept);
         }
     }
 
@@ -110,27 +110,29 @@ impl Programs {
         self.first = true;
     }
 
-    /// The last program is no start for the next.
+    /// The next program starts from scratch.
     pub fn forget(&mut self) {
-        self.last = None;
+        self.face = None;
     }
 
-    /// Starts from these multipliers, which act on the held rows; from scratch if these leave a rigid motion free.
+    /// The next program starts with these rows kept; from scratch if they leave a rigid motion of a part of a body free.
     /// Collective.
-    pub fn expect(&mut self, coarse: &Coarse, lambda: &[f64], held: Vec<bool>) {
-        self.last = CoarseFace::new(coarse, held).ok().map(|face| (lambda.to_vec(), face));
+    pub fn expect(&mut self, coarse: &Coarse, kept: Vec<bool>) {
+        self.face = CoarseFace::new(coarse, kept).ok();
     }
 
-    /// Multipliers with `G l = e` next to the last ones: the smallest such if there are none.
-    pub fn start(&self, projector: &Projector, rows: usize, balance: Vec<f64>) -> Warm {
-        let Some((last, face)) = &self.last else {
+    /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch.
+    /// Collective.
+    pub fn start(&self, projector: &Projector, last: &[f64], resultants: Vec<f64>) -> Warm {
+        let rows = last.len();
+        let Some(face) = &self.face else {
             let mut lambda = vec![0.0; rows];
-            projector.particular(&balance, &mut lambda);
-            return Warm { balance, lambda };
+            projector.particular(&resultants, &mut lambda);
+            return Warm { resultants, lambda };
         };
-        let mut lambda = last.clone();
-        let missing: Vec<f64> = balance.iter().zip(projector.coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
-        let size = balance.iter().map(|e| e * e).sum::<f64>().sqrt();
+        let mut lambda = last.to_vec();
+        let missing: Vec<f64> = resultants.iter().zip(projector.coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
+        let size = resultants.iter().map(|e| e * e).sum::<f64>().sqrt();
         if face.unbalanced(&missing, size).is_none() {
             // Open contacts stay open.
             face.add_balance(&projector.coarse, missing, &mut lambda);
@@ -139,11 +141,10 @@ impl Programs {
             projector.particular(&missing, &mut change);
             lambda.iter_mut().zip(change).for_each(|(l, c)| *l += c);
         }
-        Warm { balance, lambda }
+        Warm { resultants, lambda }
     }
 
-    /// Solves a program with the residual `b` at its start. The rows that hold the bodies afterwards are in
-    /// [`Programs::held`]. Collective.
+    /// Solves a program with the residual `b` at its start. [`Programs::face`] has the kept rows afterwards. Collective.
     ///
     /// # Errors
     /// If these rows leave a rigid motion free.
@@ -179,22 +180,15 @@ impl Programs {
         Ok(found)
     }
 
-    /// The rows that the last program's multipliers act on.
-    pub fn held(&self) -> Option<&CoarseFace> {
-        self.last.as_ref().map(|(_, face)| face)
+    /// The rows that the last program kept, with their coarse problem.
+    pub fn face(&self) -> Option<&CoarseFace> {
+        self.face.as_ref()
     }
 
-    /// The last program's multipliers, with parts that no program decides.
-    pub fn settle(&mut self, lambda: &[f64]) {
-        if let Some((last, _)) = &mut self.last {
-            last.copy_from_slice(lambda);
-        }
-    }
-
-    /// The rows that held last, all of them in the beginning.
+    /// The rows that the last program kept; all rows if there was none.
     fn take_face(&mut self, coarse: &Coarse, rows: usize) -> Result<CoarseFace, Floating> {
-        match self.last.take() {
-            Some((_, face)) => Ok(face),
+        match self.face.take() {
+            Some(face) => Ok(face),
             None => CoarseFace::new(coarse, vec![true; rows]),
         }
     }
@@ -210,8 +204,7 @@ impl Programs {
         let space = Multipliers(problem.space, dual.timer);
         let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
         let at_floor = self.note(&limits, report.first_norm);
-        let face = self.take_face(&dual.projector.coarse, lambda.len())?;
-        self.last = Some((lambda.clone(), face));
+        self.face = Some(self.take_face(&dual.projector.coarse, lambda.len())?);
         let (outcome, statistics) = (report.outcome, report.statistics);
         Ok(Found { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
     }
@@ -225,11 +218,11 @@ impl Programs {
         limits: Limits,
     ) -> Result<Found, Floating> {
         let space = Multipliers(problem.space, dual.timer);
-        let bounded: Vec<bool> = problem.constraints.rows.iter().map(|row| row.is_inequality()).collect();
+        let bounded = problem.constraints.laws().may_open();
         let rows = self.take_face(&dual.projector.coarse, bounded.len())?;
         let mut kept = rows.kept().to_vec();
         let mut face =
-            DualFace { dual: dual.reborrow(), constraints: problem.constraints, balance: &warm.balance, rows };
+            DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants: &warm.resultants, rows };
         if !face.complete(&mut kept) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
             return Ok(Found { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
@@ -240,8 +233,8 @@ impl Programs {
         let at_floor = self.note(&limits, solution.first_norm);
         let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;
         let mut lambda = balanced.clone();
-        lambda.iter_mut().zip(&bounded).filter(|(_, bounded)| **bounded).for_each(|(l, _)| *l = l.max(0.0));
-        self.last = Some((lambda.clone(), face.rows));
+        problem.constraints.laws().project(&mut lambda);
+        self.face = Some(face.rows);
         Ok(Found { lambda, balanced, outcome, statistics, at_floor })
     }
 
@@ -265,24 +258,24 @@ impl Programs {
                 statistics.hessian += estimate.as_ref().map_or(0, |e| e.products);
                 self.norm = estimate.map(|e| e.norm);
             }
-            // Open contacts are part of b, but not of the rigid motion: the last step's set tells them apart.
-            let multiplier = self.last.as_ref().map(|(_, face)| {
+            // The multiplier of G x = 0 follows from b on the rows that the last program kept. The slack of open contacts
+            // is part of b too, but is no rigid motion.
+            let multiplier = self.face.as_ref().map(|face| {
                 let mut a = face.amplitudes(&projector.coarse, &b);
                 a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
                 let mut multiplier = vec![0.0; b.len()];
                 projector.coarse.add_transpose(1.0, &a, &mut multiplier);
                 multiplier
             });
-            let contacts = problem.constraints.rows.iter().zip(&start);
-            let lower = contacts.map(|(row, l)| if row.is_inequality() { -l } else { f64::NEG_INFINITY }).collect();
+            let lower = problem.constraints.laws().lower_bounds(&start);
             let expansion = match self.settings.method {
                 Method::Smalse(expansion) => expansion,
                 Method::ActiveSet => Expansion::ProjectedCg,
             };
-            // A norm that is not finite ends as such an outcome.
+            // With a norm that is not a number SMALSE-M ends as `Outcome::NotFinite`.
             let norm = self.norm.unwrap_or(f64::NAN);
             let solution = smalse::solve(
-                smalse::Problem { space: &space, function: &mut dual, b: &projected, bounds: &Bounds::new(lower) },
+                smalse::Problem { space: &space, function: &mut dual, b: &projected, set: &FeasibleSet::above(lower) },
                 &smalse::Settings { limits, norm, expansion },
                 smalse::Start { x, multiplier },
             );
@@ -293,14 +286,14 @@ impl Programs {
         let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
-        let held = problem.constraints.rows.iter().zip(&lambda).map(|(row, &l)| !row.is_inequality() || l > 0.0);
-        let face = timer.time("coarse set-up", || CoarseFace::new(&projector.coarse, held.collect()))?;
-        self.last = Some((lambda.clone(), face));
+        let kept = problem.constraints.laws().kept(&lambda, 0.0);
+        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(&projector.coarse, kept))?);
         Ok(Found { lambda, balanced, outcome, statistics, at_floor })
     }
 
-    /// Keeps the first residual of the solve, or a larger one of an earlier solve, as the reference of all tolerances;
-    /// says whether that of the scene was aimed at.
+    /// Takes the `first` residual of a program down as the reference of all tolerances, if it is that of the first program
+    /// of a solve and larger than those of earlier solves. Returns whether the program was to be solved to the tolerance
+    /// of the scene.
     fn note(&mut self, limits: &Limits, first: f64) -> bool {
         let reference = match self.reference {
             Some(before) if self.first => before.max(first),

@@ -10,8 +10,8 @@ use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::constraint::Kind;
 use crate::feti::Torn;
 
-/// Relative residuals; all are zero for the exact solution. What they are relative to is not less than the largest such
-/// value of former increments.
+/// Relative residuals; all are zero for the exact solution. The sizes that they refer to are never less than the largest ones
+/// of former increments.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Residuals {
     /// Euclidean norm of the unbalanced nodal forces over that of the applied or internal nodal forces (or a hundred
@@ -51,26 +51,28 @@ impl TornProblem<'_> {
         self.measure(u, state, lambda).0
     }
 
-    /// The residuals, and sizes but for that in the elastic norm. Collective.
+    /// The residuals, and the sizes of this solution except its elastic norm. Collective.
     pub(super) fn measure(&self, u: &Torn, state: &State, lambda: &[f64]) -> (Residuals, Sizes) {
+        // Forces at the unsupported components of the glued problem: unbalanced, applied, internal.
         let unbalanced = self.unbalanced(state, lambda);
         let mut free = unbalanced.clone();
-        self.remove(&mut free, |kind| !matches!(kind, Kind::Contact { .. }));
+        self.remove(&mut free, |kind| !kind.is_contact());
         let mut applied = self.loads.clone();
         self.remove(&mut applied, |kind| kind == Kind::Gluing);
         let mut internal = state.forces.clone();
         self.remove(&mut internal, |kind| kind == Kind::Gluing);
         let squares = self.glued_squares([&free, &applied, &internal]);
 
-        // A body that yields bears forces that are no round-off, however far it has flown beyond a limit load.
+        // Only where nothing yields may all forces be round-off: bodies that move without strain.
         let terms = if state.plastic == 0 { SIGNIFICANT * state.terms.force_squares.sqrt() } else { 0.0 };
 
+        // The largest distance between copies, penetration, product of force and gap, contact force, and displacement.
         let slack = self.slack(u);
         let mut worst = [0.0_f64; 5];
         for ((row, &s), &force) in self.constraints.rows.iter().zip(&slack).zip(lambda) {
             let (gap, force) = (s / row.scale, row.scale * force);
-            let found = if row.is_inequality() {
-                [0.0, (-gap).max(0.0), (gap * force).abs(), force.abs(), 0.0]
+            let found = if row.kind.is_contact() {
+                [0.0, row.law().violation(gap).abs(), (gap * force).abs(), force.abs(), 0.0]
             } else {
                 [s.abs() / row.length, 0.0, 0.0, 0.0, 0.0]
             };
@@ -102,7 +104,7 @@ impl TornProblem<'_> {
     /// `lambda_I`: the multipliers of contact, zeros in place of the others.
     pub(super) fn of_contact(&self, lambda: &[f64]) -> Vec<f64> {
         let rows = self.constraints.rows.iter().zip(lambda);
-        rows.map(|(row, &l)| if row.is_inequality() { l } else { 0.0 }).collect()
+        rows.map(|(row, &l)| if row.kind.is_contact() { l } else { 0.0 }).collect()
     }
 
     /// Force of each support on the bodies, `[support][component]`. Collective.
@@ -117,8 +119,8 @@ impl TornProblem<'_> {
                 if let Kind::Support { support, axis } = row.kind {
                     sum[3 * support + axis] -= value / row.scale;
                 }
-                for held in &row.held {
-                    sum[3 * held.support + held.axis] += row.scale * force * held.weight;
+                for fixed in &row.fixed {
+                    sum[3 * fixed.support + fixed.axis] += row.scale * force * fixed.weight;
                 }
             }
         }
@@ -126,13 +128,13 @@ impl TornProblem<'_> {
         sum.chunks_exact(3).map(|r| [r[0], r[1], r[2]]).collect()
     }
 
-    /// Removes from a torn vector its part along the rows of some kinds: those along gluing rows leave the mean over
-    /// the copies, those along support rows nothing.
+    /// Removes from a torn vector its part along the rows of some kinds. Without the part along gluing rows all copies have
+    /// the mean; without the part along support rows as well, supported components are zero.
     fn remove(&self, v: &mut Torn, kinds: impl Fn(Kind) -> bool) {
         self.gather.add_transpose(-1.0, &self.along(v, kinds), v);
     }
 
-    /// What a torn vector is along the rows of some kinds: `B'` of it is that part of the vector.
+    /// Coefficients `x` of a torn vector along the rows of some kinds, zero elsewhere: `B'x` is that part of the vector.
     pub(super) fn along(&self, v: &Torn, kinds: impl Fn(Kind) -> bool) -> Vec<f64> {
         let mut rows = vec![0.0; self.gather.rows()];
         self.gather.apply(v, &mut rows);
@@ -142,8 +144,8 @@ impl TornProblem<'_> {
         rows
     }
 
-    /// Squared norms over the nodes of the undecomposed mesh, of torn vectors whose copies all hold the mean: a node of
-    /// `m` copies carries `m` times the mean, and is met `m` times.
+    /// Squared norms over the nodes of the undecomposed mesh, of torn vectors whose copies all have the mean `x`. The sum over
+    /// the `m` copies of a node is `m x`: its square is `m` times the squares of the copies.
     fn glued_squares<const N: usize>(&self, vectors: [&Torn; N]) -> Vec<f64> {
         let mut partial = Vec::with_capacity(N * self.subdomains.len());
         for (own, copies) in self.constraints.copies.iter().enumerate() {

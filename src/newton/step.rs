@@ -98,21 +98,14 @@ impl<'a> StepSolver<'a> {
         SolverState { programs: self.programs.state(), flows, precision, bases }
     }
 
-    /// Goes on from such a state, with the multipliers that belong to it: makes the factors again, to the same bits.
-    /// Collective.
+    /// Goes on from such a state: makes the factors again, to the same bits. Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent is singular.
-    pub fn resume(
-        &mut self,
-        problem: &TornProblem,
-        state: SolverState,
-        lambda: &[f64],
-        timer: &Timer,
-    ) -> Result<(), String> {
+    pub fn resume(&mut self, problem: &TornProblem, state: SolverState, timer: &Timer) -> Result<(), String> {
         let SolverState { programs, flows, precision, bases } = state;
         self.flows = flows;
-        self.programs.resume(&self.projector.coarse, programs, lambda);
+        self.programs.resume(&self.projector.coarse, programs);
         self.operator.factors.set_precision(precision);
         let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
         let outcome = self.tangents.remake(&problem.regions(), bases, &mut on);
@@ -125,16 +118,8 @@ impl<'a> StepSolver<'a> {
         let mut lambda = vec![0.0; held.len()];
         problem.gather.apply(&problem.unbalance(state), &mut lambda);
         problem.coupling.borrow_mut().solve(&mut lambda, |row| held[row]);
-        for ((l, row), &held) in lambda.iter_mut().zip(&problem.constraints.rows).zip(&held) {
-            *l = if !held {
-                0.0
-            } else if row.is_inequality() {
-                l.max(0.0)
-            } else {
-                *l
-            };
-        }
-        self.programs.expect(&self.projector.coarse, &lambda, held);
+        problem.constraints.laws().project_onto(&held, &mut lambda);
+        self.programs.expect(&self.projector.coarse, held);
         lambda
     }
 
@@ -182,7 +167,8 @@ impl<'a> StepSolver<'a> {
         }
     }
 
-    /// Solves for the step at `u`; `alive` is told the applications of F so far. Collective.
+    /// Solves for the step at `u` from the `last` multipliers, those of the step before or of the last attempt at this one;
+    /// `alive` is told the applications of F so far. Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent or the coarse problem is singular.
@@ -190,6 +176,7 @@ impl<'a> StepSolver<'a> {
         &mut self,
         problem: &TornProblem,
         (u, state): (&Torn, &State),
+        last: &[f64],
         forcing: Forcing,
         timer: &Timer,
         alive: &dyn Fn(usize),
@@ -205,7 +192,7 @@ impl<'a> StepSolver<'a> {
         let coarse = &self.projector.coarse;
         let warm = timer.time("coarse problem", || {
             let balance = recover::resultants(problem.subdomains, problem.modes, coarse, &forces);
-            self.programs.start(&self.projector, rows, balance)
+            self.programs.start(&self.projector, last, balance)
         });
         let mut b = vec![0.0; rows];
         let mut torn = forces.clone();
@@ -242,11 +229,10 @@ impl<'a> StepSolver<'a> {
             self.add_hidden(problem, (&forces, &du), [&mut lambda, &mut balanced]);
             problem.gather.apply(&du, &mut defect);
         }
-        self.programs.settle(&lambda);
         defect.iter_mut().zip(&open).for_each(|(d, s)| *d -= s);
-        if let Some(held) = self.programs.held() {
+        if let Some(face) = self.programs.face() {
             let coarse = &self.projector.coarse;
-            let back = timer.time("coarse problem", || motion::amplitudes(held, coarse, problem.space, &defect));
+            let back = timer.time("coarse problem", || motion::amplitudes(face, coarse, problem.space, &defect));
             recover::add_rigid_motion(problem.subdomains, problem.modes, coarse, -1.0, &back, &mut du);
         }
         for (du, lifted) in du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {
@@ -295,13 +281,12 @@ impl<'a> StepSolver<'a> {
     /// Closes what the dual solver's tolerance left open in the held and the violated rows, at the least cost in energy
     /// that the preconditioner knows.
     fn mend(&mut self, problem: &TornProblem, slack: &[f64], du: &mut Torn, timer: &Timer) {
-        let (Some(preconditioner), Some(held)) = (&mut self.preconditioner, self.programs.held()) else { return };
+        let (Some(preconditioner), Some(face)) = (&mut self.preconditioner, self.programs.face()) else { return };
         let mut defect = vec![0.0; slack.len()];
         problem.gather.apply(du, &mut defect);
-        for ((d, s), row) in defect.iter_mut().zip(slack).zip(&problem.constraints.rows) {
-            *d = if row.is_inequality() { (s - *d).min(0.0) } else { s - *d };
-        }
-        let kept = |row: usize| held.kept()[row] || defect[row] < 0.0;
+        defect.iter_mut().zip(slack).for_each(|(d, s)| *d = s - *d);
+        problem.constraints.laws().violation(&mut defect);
+        let kept = |row: usize| face.kept()[row] || defect[row] != 0.0;
         timer.time("scaling", || preconditioner.scaling.restrict(problem.constraints, kept));
         timer.time("preconditioner", || preconditioner.mend(&defect, du));
     }

@@ -2,11 +2,13 @@
 //!
 //! The fast path of contact: guess the rows that carry a force, solve the equality problem on them, correct the guess
 //! (the primal-dual active set strategy, Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2002), applied to the dual).
-//! Rows with x_i < 0 are let go; rows outside that show a violated gap (d - A x - G'a)_i > 0 are taken in. The equality
-//! problems are solved loosely: whenever the residual has dropped by a factor the set is looked at, and PCPG goes on
-//! with its directions if the set stands. That can be too loose: where stiffness jumps the residual is that of the soft, forces
-//! and gaps of stiff rows may still be all error, and sets wander without coming back. There, and where a correction is much
-//! larger than one before, they are solved to the end before they are corrected.
+//! Kept rows with x_i < 0 are let go; other rows with a violated gap, (d - A x - G'a)_i > 0, are taken in.
+//!
+//! The equality problems are solved loosely. Each time the residual has dropped by a factor the set is checked, and PCPG
+//! goes on with its directions if the set stands. This can be too loose. Where stiffness jumps, the norm of the residual is
+//! that of the soft parts; the forces and gaps of stiff rows may still be wrong, and the sets may wander. So the equality
+//! problems are solved to the tolerance where stiffness jumps, and as soon as a set comes back or a correction is much
+//! larger than an earlier one.
 //!
 //! No proof of convergence goes with it: sets that come back end as [`Outcome::Cycled`], and the caller turns to
 //! [`super::smalse`]. Unlike there x is not homogenised: bounds are zero and the equalities have a right-hand side,
@@ -18,24 +20,24 @@ use super::{Limits, Outcome, Statistics, axpy};
 
 /// Factor by which the residual drops between two looks at the set.
 const LOOSE: f64 = 0.1;
-/// A correction so many times as large as the smallest so far shows that sets were not known well enough to be corrected.
+/// A correction that changes this many times more rows than the smallest so far: sets are corrected too early.
 const GROWTH: f64 = 2.0;
-/// Sets that may pass.
+/// Sets that are tried at most.
 const SETS: usize = 60;
 /// A move of x smaller than this, relative to x, is rounding.
 const ROUNDING: f64 = 1e-13;
 
 /// The problem on the rows of a set. All answers must be the same on all ranks.
 pub trait Face: Quadratic {
-    /// From now on x, P and M live on the kept rows: all others are zero. Rows are added where the equalities cannot be met
-    /// without (a body would hang on nothing); false if that does not help.
+    /// From now on x, P and M are restricted to the kept rows; x is zero elsewhere. Adds rows if G x = e has no solution on
+    /// the kept ones (a body that nothing holds). False if it has none then.
     fn restrict(&mut self, kept: &mut [bool]) -> bool;
 
-    /// The shortest way into { G x = e, x = 0 off the kept rows }.
+    /// Moves x to the nearest point of { G x = e, x = 0 off the kept rows }.
     fn restore(&mut self, x: &mut [f64]);
 
-    /// From `residual` = d - A x on all rows, in place: residual - G'a with the a that makes it smallest on the kept rows.
-    /// A positive entry is a violated gap.
+    /// Replaces `residual` = d - A x by residual - G'a, with the a that makes this smallest on the kept rows. Positive
+    /// entries are violated gaps.
     fn gaps(&mut self, residual: &mut [f64]);
 }
 
@@ -45,7 +47,7 @@ pub struct Solution {
     pub x: Vec<f64>,
     /// `d - A x`.
     pub residual: Vec<f64>,
-    /// The rows that are not held at zero.
+    /// Rows where x need not be zero.
     pub kept: Vec<bool>,
     /// How it ended.
     pub outcome: Outcome,
@@ -67,8 +69,8 @@ pub struct Start {
     pub uneven: bool,
 }
 
-/// Solves the problem. The reference of `limits` is by default the first residual, which at a warm start is too small:
-/// give one there.
+/// Solves the problem. Give `limits` a reference at a warm start: the default is the first residual, which is too small
+/// there.
 pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Start, limits: &Limits) -> Solution {
     let Start { x, residual, kept, uneven } = start;
     let n = x.len();
@@ -103,11 +105,11 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Alternates between solving and correcting the set; `wish` is where x would like to start.
+    /// Alternates between solving and correcting the set. x starts on each set as near to `wish` as the set allows.
     fn iterate(&mut self, face: &mut dyn Face, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
         let mut solver = Pcpg::new(self.space);
         let mut target = None;
-        // Sets seen, and whether sets are solved to the end before they are corrected: so once one has come back, or wanders.
+        // The sets so far, and whether each is solved to the tolerance before it is corrected.
         let (mut history, mut strict) = (Vec::new(), self.uneven);
         let mut smallest = f64::INFINITY;
         while history.len() < SETS {
@@ -153,7 +155,7 @@ impl Run<'_> {
         Outcome::Cycled
     }
 
-    /// Moves x as near to `wish` as the set allows, by one product; by none where it is there already.
+    /// Moves x as near to `wish` as the set allows. Costs one product, none if x is there already.
     fn move_to(&mut self, face: &mut dyn Face, wish: &mut [f64]) {
         for (w, kept) in wish.iter_mut().zip(&self.kept) {
             *w *= f64::from(*kept);
@@ -178,8 +180,8 @@ impl Run<'_> {
         self.space.norm(&self.work)
     }
 
-    /// Lets rows of negative force go and takes rows of violated gap in; returns how many, over all ranks. The tolerance for
-    /// gaps only keeps a row of no force and no gap from coming and going.
+    /// Lets rows of negative force go and takes rows of violated gap in; returns how many, over all ranks. The tolerance of
+    /// gaps keeps rows that have neither force nor gap from coming and going.
     fn correct(&mut self, face: &mut dyn Face, tolerance: f64) -> f64 {
         self.work.copy_from_slice(&self.residual);
         face.gaps(&mut self.work);

@@ -94,7 +94,7 @@ impl Matrix {
     }
 
     pub fn cost(&self, x: &[f64], b: &[f64]) -> f64 {
-        0.5 * dot(x, &self.times(x)) - dot(x, b)
+        0.5 * dot(x, self.times(x)) - dot(x, b)
     }
 
     pub fn times(&self, x: &[f64]) -> Vec<f64> {

@@ -3,7 +3,7 @@
 //! The problem is min 1/2 x'A x - x'b over { x >= l, G x = 0 }, known by products with A and with the orthogonal
 //! projector P onto the null space of G ([`quadratic`]). A needs to be positive definite on that null space only.
 //!
-//! - [`smalse`]: bounds and equalities, convergence guaranteed; its inner loop is [`mprgp`] on [`bounds`];
+//! - [`smalse`]: bounds and equalities, convergence guaranteed; its inner loop is [`mprgp`] on [`feasible`];
 //! - [`pcpg`]: equalities only, with all search directions kept;
 //! - [`active_set`]: guesses the active bounds, solves for equalities, corrects the guess: fast, but without a proof;
 //! - [`nnls`]: small dense nonnegative least squares: whether a force can be made of pushes;
@@ -12,7 +12,7 @@
 //! A solver never fails with an error: it ends with an [`Outcome`] and the best it has.
 
 pub mod active_set;
-pub mod bounds;
+pub mod feasible;
 pub mod mprgp;
 pub mod nnls;
 pub mod pcpg;
@@ -93,8 +93,8 @@ pub struct Limits {
     pub reference: Option<f64>,
     /// Tolerance in the units of the gradient.
     pub absolute: f64,
-    /// Tolerance relative to the gradient norm at the start, for who wants that reduced and no more; 0 to reach the
-    /// others.
+    /// Tolerance relative to the gradient norm at the start: to reduce it by this factor is enough. 0 to reach the other
+    /// tolerances.
     pub drop: f64,
     /// Products with A that may be spent.
     pub products: usize,

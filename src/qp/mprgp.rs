@@ -7,10 +7,10 @@
 //! z = mask(M mask(g)) with one M for all faces.
 //!
 //! The cost never rises: an expansion that failed to lower it is replaced by one that cannot fail. The gradient is
-//! updated along CG steps and is computed afresh after expansions. Beside x, the part of x that violates equality
-//! constraints (if any) is carried along, since who penalises it wants to stop by it.
+//! updated along CG steps and is computed afresh after expansions. Beside x goes its *defect*, the part that violates
+//! equality constraints: SMALSE-M penalises it and stops by it.
 
-use super::bounds::{Bounds, Parts};
+use super::feasible::{FeasibleSet, Parts};
 use super::quadratic::Space;
 use super::{Outcome, Statistics, axpy};
 
@@ -70,10 +70,26 @@ pub struct Norms {
     pub defect: f64,
 }
 
+/// Inner products of the parts of a gradient, of the defect, and of phi with the last `H p`.
+struct Squares {
+    free: f64,
+    chopped: f64,
+    reduced_free: f64,
+    defect: f64,
+    free_hp: f64,
+}
+
+/// The cost along a direction p: p'H p, p'g, and the longest step in the set.
+struct Line {
+    curvature: f64,
+    slope: f64,
+    reach: f64,
+}
+
 /// The solver: its problem apart from H and b, and its work space.
 pub struct Mprgp<'a> {
     space: &'a dyn Space,
-    bounds: &'a Bounds,
+    set: &'a FeasibleSet,
     expansion: Expansion,
     norm: f64,
     products: usize,
@@ -88,15 +104,15 @@ pub struct Mprgp<'a> {
 
 impl<'a> Mprgp<'a> {
     /// `norm` is an estimate of the norm of H, `products` the number of products after which to give up.
-    pub fn new(space: &'a dyn Space, bounds: &'a Bounds, expansion: Expansion, norm: f64, products: usize) -> Self {
-        let zero = || vec![0.0; bounds.lower().len()];
+    pub fn new(space: &'a dyn Space, set: &'a FeasibleSet, expansion: Expansion, norm: f64, products: usize) -> Self {
+        let zero = || vec![0.0; set.dimension()];
         Self {
             space,
-            bounds,
+            set,
             expansion,
             norm,
             products,
-            parts: Parts::new(bounds.lower().len()),
+            parts: Parts::new(set.dimension()),
             p: zero(),
             hp: zero(),
             defect: zero(),
@@ -118,42 +134,32 @@ impl<'a> Mprgp<'a> {
         // Curvature of the last direction while CG may continue from it.
         let mut last: Option<f64> = None;
         loop {
-            self.bounds.split(&point.x, &point.gradient, FIXED_STEP / self.norm, &mut self.parts);
-            let Parts { free, chopped, reduced } = &self.parts;
-            let defect = &point.defect;
-            let d = self.space.dots(&[
-                (free, free),
-                (chopped, chopped),
-                (reduced, free),
-                (defect, defect),
-                (free, &self.hp),
-            ]);
-            if d.iter().any(|v| !v.is_finite()) {
+            // Stopping tests, by the projected gradient phi + beta.
+            let Squares { free, chopped, reduced_free, defect, free_hp } = self.measure(point);
+            if ![free, chopped, reduced_free, defect, free_hp].iter().all(|v| v.is_finite()) {
                 return Outcome::NotFinite;
             }
-            if stop(Norms { gradient: (d[0] + d[1]).sqrt(), defect: d[3].sqrt() }) {
+            if stop(Norms { gradient: (free + chopped).sqrt(), defect: defect.sqrt() }) {
                 return Outcome::Converged;
             }
             if statistics.hessian >= self.products {
                 return Outcome::LimitReached;
             }
 
-            let proportional = d[1] <= PROPORTION * PROPORTION * d[2];
+            // Proportioning test |beta|^2 <= Gamma^2 phi~'phi: a CG direction in the face, or one that leaves it along beta.
+            let proportional = chopped <= PROPORTION * PROPORTION * reduced_free;
             if proportional {
-                self.conjugate(hessian, &point.x, d[0], d[4], last, statistics);
+                self.conjugate(hessian, &point.x, (free, free_hp), last, statistics);
             } else {
-                self.p.copy_from_slice(chopped);
+                self.p.copy_from_slice(&self.parts.chopped);
             }
-            let reach = self.space.minimum(self.bounds.reach(&point.x, &self.p));
-            hessian.apply(&self.p, &mut self.hp, &mut self.defect);
-            statistics.hessian += 1;
-            let d = self.space.dots(&[(&self.p, &self.hp), (&self.p, &point.gradient)]);
-            let (curvature, slope) = (d[0], d[1]);
-            if !(curvature.is_finite() && slope.is_finite() && !reach.is_nan()) {
+
+            // The step to the minimum along p, and the one to the boundary of the set.
+            let Some(Line { curvature, slope, reach }) = self.line(hessian, point, statistics) else {
                 return Outcome::NotFinite;
-            }
+            };
             if slope <= 0.0 && last.is_some() {
-                // Conjugacy is lost in rounding.
+                // Conjugacy is lost in rounding: CG starts anew.
                 last = None;
                 continue;
             }
@@ -161,11 +167,10 @@ impl<'a> Mprgp<'a> {
             if step.min(reach) == f64::INFINITY {
                 return Outcome::Unbounded;
             }
+
+            // CG or proportioning step inside the set; else expansion.
             if step <= reach {
-                self.bounds.advance(&mut point.x, step, &self.p);
-                axpy(-step, &self.hp, &mut point.gradient);
-                axpy(-step, &self.defect, &mut point.defect);
-                point.age += 1;
+                self.walk(point, step);
                 last = proportional.then_some(curvature);
                 *if proportional { &mut statistics.cg } else { &mut statistics.proportionings } += 1;
             } else {
@@ -176,13 +181,41 @@ impl<'a> Mprgp<'a> {
         }
     }
 
-    /// The next CG direction: the (preconditioned) free gradient, H-conjugate to the last direction if there is one.
+    /// Splits the gradient at the point, and measures its parts. One collective.
+    fn measure(&mut self, point: &Point) -> Squares {
+        self.set.split(&point.x, &point.gradient, FIXED_STEP / self.norm, &mut self.parts);
+        let Parts { free, chopped, reduced } = &self.parts;
+        let defect = &point.defect;
+        let d =
+            self.space.dots(&[(free, free), (chopped, chopped), (reduced, free), (defect, defect), (free, &self.hp)]);
+        Squares { free: d[0], chopped: d[1], reduced_free: d[2], defect: d[3], free_hp: d[4] }
+    }
+
+    /// The cost along the direction p, by one product with H; `None` if something is not finite.
+    fn line(&mut self, hessian: &mut dyn Hessian, point: &Point, statistics: &mut Statistics) -> Option<Line> {
+        let reach = self.space.minimum(self.set.reach(&point.x, &self.p));
+        hessian.apply(&self.p, &mut self.hp, &mut self.defect);
+        statistics.hessian += 1;
+        let d = self.space.dots(&[(&self.p, &self.hp), (&self.p, &point.gradient)]);
+        let (curvature, slope) = (d[0], d[1]);
+        (curvature.is_finite() && slope.is_finite() && !reach.is_nan()).then_some(Line { curvature, slope, reach })
+    }
+
+    /// A step of this length along p that stays in the set; gradient and defect follow without a product.
+    fn walk(&mut self, point: &mut Point, step: f64) {
+        self.set.advance(&mut point.x, step, &self.p);
+        axpy(-step, &self.hp, &mut point.gradient);
+        axpy(-step, &self.defect, &mut point.defect);
+        point.age += 1;
+    }
+
+    /// The next CG direction: the (preconditioned) free gradient, H-conjugate to the last direction if there is one. Given
+    /// are phi'phi and phi'H p.
     fn conjugate(
         &mut self,
         hessian: &mut dyn Hessian,
         x: &[f64],
-        free_free: f64,
-        free_hp: f64,
+        (free_free, free_hp): (f64, f64),
         last: Option<f64>,
         statistics: &mut Statistics,
     ) {
@@ -190,7 +223,7 @@ impl<'a> Mprgp<'a> {
         let mut z = &self.parts.free;
         if free_free > 0.0 && hessian.precondition(&self.parts.free, &mut self.z) {
             statistics.preconditioner += 1;
-            self.bounds.mask(x, &mut self.z);
+            self.set.mask(x, &mut self.z);
             let d = self.space.dots(&[(&self.z, &self.hp), (&self.z, &self.parts.free)]);
             // A preconditioner that is not positive in this face is not used.
             if d[1] > 0.0 {
@@ -216,7 +249,7 @@ impl<'a> Mprgp<'a> {
         self.old.copy_from_slice(&point.x);
         self.old_gradient.copy_from_slice(&point.gradient);
         if self.expansion == Expansion::ProjectedCg && step.is_finite() {
-            self.bounds.advance(&mut point.x, step, &self.p);
+            self.set.advance(&mut point.x, step, &self.p);
             point.refresh(hessian, b, statistics);
             if self.lowered(point) {
                 return;
@@ -224,13 +257,13 @@ impl<'a> Mprgp<'a> {
         }
 
         // To the bound, where the gradient costs nothing; from there a gradient step.
-        self.bounds.advance(&mut self.old, reach, &self.p);
+        self.set.advance(&mut self.old, reach, &self.p);
         axpy(-reach, &self.hp, &mut self.old_gradient);
         self.parts.free.copy_from_slice(&self.old_gradient);
-        self.bounds.mask(&self.old, &mut self.parts.free);
+        self.set.mask(&self.old, &mut self.parts.free);
         for _ in 0..=DOUBLINGS {
             point.x.copy_from_slice(&self.old);
-            self.bounds.advance(&mut point.x, FIXED_STEP / self.norm, &self.parts.free);
+            self.set.advance(&mut point.x, FIXED_STEP / self.norm, &self.parts.free);
             point.refresh(hessian, b, statistics);
             if self.lowered(point) {
                 return;
@@ -283,7 +316,7 @@ mod tests {
         a: &mut Matrix,
         m: Option<&mut Matrix>,
         b: &[f64],
-        bounds: &Bounds,
+        set: &FeasibleSet,
         expansion: Expansion,
         norm: f64,
         tolerance: f64,
@@ -293,9 +326,9 @@ mod tests {
         let mut hessian = Alone(a, m);
         let mut statistics = Statistics::default();
         let mut point = Point { x: vec![0.0; n], gradient: vec![0.0; n], defect: vec![0.0; n], age: 0 };
-        bounds.project(&mut point.x);
+        set.project(&mut point.x);
         point.refresh(&mut hessian, b, &mut statistics);
-        let mut solver = Mprgp::new(&Plain, bounds, expansion, norm, 3000);
+        let mut solver = Mprgp::new(&Plain, set, expansion, norm, 3000);
         let mut last = f64::INFINITY;
         let mut outcome = Outcome::Converged;
         let mut done = false;
@@ -323,11 +356,11 @@ mod tests {
             let b = random.vector(n);
             let lower: Vec<f64> = (0..n).map(|i| if i < 7 { 2.0 * random.next() } else { f64::NEG_INFINITY }).collect();
             let exact = enumerate(&a, &b, &lower, &Null::default());
-            let bounds = Bounds::new(lower);
+            let set = FeasibleSet::above(lower);
             for expansion in [Expansion::ProjectedCg, Expansion::Fixed] {
                 // A norm four times too small must not break it.
                 for norm in [1.0, 0.25] {
-                    let found = run(&mut a, None, &b, &bounds, expansion, norm, 1e-9);
+                    let found = run(&mut a, None, &b, &set, expansion, norm, 1e-9);
                     assert_eq!(found.outcome, Outcome::Converged);
                     assert!(distance(&found.x, &exact) < 1e-6, "case {case} {expansion:?} {:?}", found.statistics);
                 }
@@ -336,23 +369,23 @@ mod tests {
     }
 
     /// Membrane under load above a flat obstacle, 23 x 23 points.
-    fn membrane() -> (Matrix, Vec<f64>, Bounds) {
+    fn membrane() -> (Matrix, Vec<f64>, FeasibleSet) {
         let a = Matrix::laplacian(23);
         let n = a.n;
-        (a, vec![-10.0; n], Bounds::new(vec![-0.3; n]))
+        (a, vec![-10.0; n], FeasibleSet::above(vec![-0.3; n]))
     }
 
     #[test]
     fn membrane_over_an_obstacle() {
-        let (mut a, b, bounds) = membrane();
+        let (mut a, b, set) = membrane();
         let norm = 8.0 * 24.0 * 24.0;
         let mut solutions = Vec::new();
         for (expansion, limit) in [(Expansion::ProjectedCg, 90), (Expansion::Fixed, 300)] {
-            let found = run(&mut a, None, &b, &bounds, expansion, norm, 1e-7 * dot(&b, &b).sqrt());
+            let found = run(&mut a, None, &b, &set, expansion, norm, 1e-7 * dot(&b, &b).sqrt());
             assert_eq!(found.outcome, Outcome::Converged);
             assert!(found.statistics.hessian <= limit, "{expansion:?} {:?}", found.statistics);
             let ax = a.times(&found.x);
-            let active = bounds.active(&found.x);
+            let active = set.active(&found.x);
             for i in 0..a.n {
                 let force = ax[i] - b[i];
                 assert!(if active[i] { force >= -1e-4 } else { force.abs() < 1e-4 && found.x[i] > -0.3 });
@@ -364,13 +397,13 @@ mod tests {
 
     #[test]
     fn preconditioned_in_the_face() {
-        let (mut a, b, bounds) = membrane();
+        let (mut a, b, set) = membrane();
         let tolerance = 1e-7 * dot(&b, &b).sqrt();
-        let plain = run(&mut a, None, &b, &bounds, Expansion::ProjectedCg, 4608.0, tolerance);
+        let plain = run(&mut a, None, &b, &set, Expansion::ProjectedCg, 4608.0, tolerance);
         let mut shifted = Matrix::new(a.n, a.entries.clone());
         (0..a.n).for_each(|i| shifted.entries[i * a.n + i] += 20.0);
         let mut m = shifted.inverse();
-        let fast = run(&mut a, Some(&mut m), &b, &bounds, Expansion::ProjectedCg, 4608.0, tolerance);
+        let fast = run(&mut a, Some(&mut m), &b, &set, Expansion::ProjectedCg, 4608.0, tolerance);
         assert!(distance(&plain.x, &fast.x) < 1e-6);
         assert!(fast.statistics.hessian < plain.statistics.hessian, "{:?} {:?}", fast.statistics, plain.statistics);
     }
@@ -381,7 +414,7 @@ mod tests {
         let mut a = Matrix::with_eigenvalues(&[1.0, 0.0, 0.0], &mut random);
         a.entries.iter_mut().for_each(|v| *v = -*v);
         let b = random.vector(3);
-        let free = Bounds::new(vec![f64::NEG_INFINITY; 3]);
+        let free = FeasibleSet::above(vec![f64::NEG_INFINITY; 3]);
         assert_eq!(run(&mut a, None, &b, &free, Expansion::ProjectedCg, 1.0, 1e-9).outcome, Outcome::Unbounded);
         a.entries[4] = f64::NAN;
         assert_eq!(run(&mut a, None, &b, &free, Expansion::ProjectedCg, 1.0, 1e-9).outcome, Outcome::NotFinite);

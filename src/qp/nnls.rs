@@ -19,7 +19,7 @@ pub struct Solution {
 
 /// Solves the problem for the columns of A, each as long as b.
 pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
-    let norms: Vec<f64> = columns.iter().map(|column| length(column)).collect();
+    let norms: Vec<f64> = columns.iter().map(length).collect();
     let threshold = ROUNDING * length(b);
     let mut x = vec![0.0; columns.len()];
     // Columns with a positive share, and those that rounding keeps from joining at the present residual.
@@ -198,7 +198,7 @@ mod tests {
             let mut random = Random::new(seed);
             for _ in 0..2000 {
                 let y: [f64; 3] = random.vector(3.0);
-                assert!(!fits(&y) || length(&y) >= distance - 1e-9, "{seed}");
+                assert!(!fits(&y) || length(y) >= distance - 1e-9, "{seed}");
             }
         }
         assert!(found_any > 10, "{found_any}");

@@ -2,11 +2,11 @@
 //!
 //! Farhat, Lesoinne and Pierson, Numer. Linear Algebra Appl. 7 (2000). Every direction is P M P r, orthogonalised in the
 //! A-inner product against *all* kept directions: at some dozens of iterations this costs little next to the products
-//! and restores the convergence that round-off takes. Rows that are to stay zero are the projector's affair: if P maps
-//! onto vectors that vanish there, so do all directions.
+//! and restores the convergence that round-off takes. To keep some rows zero, let P map onto vectors that are zero there:
+//! then all directions are.
 //!
-//! The residual b - A x is carried *unprojected*, so that a caller who changes P or moves x goes on from it. Beside it goes
-//! the projected one with its norm, by recurrences: an iteration has three collectives, for P M P r, for the kept
+//! The residual b - A x is carried *unprojected*, so that a caller can change P or move x and go on from it. The projected
+//! residual and its norm are carried by recurrences. An iteration has three collectives: for P M P r, for the kept
 //! directions, and for P A p with all other inner products.
 
 use super::quadratic::{Quadratic, Space};
@@ -15,7 +15,7 @@ use super::{Limits, Outcome, Statistics, axpy};
 /// Directions kept (two vectors each); beyond that the oldest is replaced.
 const KEPT: usize = 240;
 
-/// Drop of the squared norm from which it is measured again.
+/// When the squared norm has dropped by this factor it is measured again.
 const REFRESH: f64 = 1e-4;
 
 /// How it ended.
@@ -36,6 +36,26 @@ struct Direction {
     p: Vec<f64>,
     ap: Vec<f64>,
     curvature: f64,
+}
+
+/// The projected residual, carried on by recurrences.
+struct Inside {
+    /// P r.
+    residual: Vec<f64>,
+    /// Its squared norm; the recurrence rounds relative to where it began.
+    square: f64,
+    /// The squared norm when it was measured last.
+    measured: f64,
+}
+
+impl Inside {
+    /// Projects and measures a residual.
+    fn of(space: &dyn Space, function: &mut dyn Quadratic, residual: &[f64]) -> Self {
+        let mut residual = residual.to_vec();
+        function.project(&mut residual);
+        let square = space.dot(&residual, &residual);
+        Self { residual, square, measured: square }
+    }
 }
 
 /// The solver with the directions it keeps. As long as A and P stay the same it goes on from them: to solve loosely,
@@ -67,48 +87,42 @@ impl<'a> Pcpg<'a> {
         residual: &mut [f64],
         limits: &Limits,
     ) -> Report {
-        let n = x.len();
-        let (mut inside, mut z) = (residual.to_vec(), vec![0.0; n]);
         let mut statistics = Statistics::default();
-        function.project(&mut inside);
-        let mut square = self.space.dot(&inside, &inside);
-        let first_norm = square.sqrt();
-        // The recurrence of the norm rounds relative to where it began.
-        let mut measured = square;
+        let mut inside = Inside::of(self.space, function, residual);
+        let first_norm = inside.square.sqrt();
         loop {
-            let norm = square.sqrt();
+            // Stopping tests by |P r|, which is measured before it is believed.
+            let norm = inside.square.sqrt();
             let report = |outcome, statistics| Report { outcome, statistics, first_norm, norm };
             if !norm.is_finite() {
                 return report(Outcome::NotFinite, statistics);
             }
             let small = norm <= limits.target(first_norm);
-            if small && square == measured {
+            if small && inside.square == inside.measured {
                 return report(Outcome::Converged, statistics);
             }
-            if small || square < REFRESH * measured {
-                inside.copy_from_slice(residual);
-                function.project(&mut inside);
-                square = self.space.dot(&inside, &inside);
-                measured = square;
+            if small || inside.square < REFRESH * inside.measured {
+                inside = Inside::of(self.space, function, residual);
                 continue;
             }
             if statistics.hessian >= limits.products {
                 return report(Outcome::LimitReached, statistics);
             }
 
-            if function.precondition(&inside, &mut z) {
-                function.project(&mut z);
-                statistics.preconditioner += 1;
-            } else {
-                z.copy_from_slice(&inside);
-            }
-            self.orthogonalise(&mut z);
-            let mut ap = vec![0.0; n];
-            function.apply(&z, &mut ap);
+            // The direction p = P M P r, A-orthogonal to all kept ones, and its product.
+            let p = self.direction(function, &inside.residual, &mut statistics);
+            let mut ap = vec![0.0; p.len()];
+            function.apply(&p, &mut ap);
             statistics.hessian += 1;
+
+            // The step p'P r / p'A p, with the products that the norm of the next P r follows from.
             let mut projected = ap.clone();
-            let (square_ap, d) =
-                function.project_with_products(self.space, &mut projected, &[&z, &inside], &[(&z, &inside)]);
+            let (square_ap, d) = function.project_with_products(
+                self.space,
+                &mut projected,
+                &[&p, &inside.residual],
+                &[(&p, &inside.residual)],
+            );
             let [curvature, change, slope] = d[..] else { unreachable!("three products were asked for") };
             if !(curvature.is_finite() && slope.is_finite()) {
                 return report(Outcome::NotFinite, statistics);
@@ -117,17 +131,30 @@ impl<'a> Pcpg<'a> {
                 return report(Outcome::Unbounded, statistics);
             }
             let step = slope / curvature;
-            axpy(step, &z, x);
+            axpy(step, &p, x);
             axpy(-step, &ap, residual);
-            axpy(-step, &projected, &mut inside);
-            square += step * (step * square_ap - 2.0 * change);
-            if square < 0.0 {
-                square = 0.0;
+            axpy(-step, &projected, &mut inside.residual);
+            inside.square += step * (step * square_ap - 2.0 * change);
+            if inside.square < 0.0 {
+                inside.square = 0.0;
             }
             statistics.cg += 1;
-            let p = std::mem::replace(&mut z, vec![0.0; n]);
             self.keep(Direction { p, ap, curvature });
         }
+    }
+
+    /// The next direction: `P M r` of the projected residual, or `r` itself without a preconditioner, A-orthogonal to the
+    /// kept ones.
+    fn direction(&self, function: &mut dyn Quadratic, r: &[f64], statistics: &mut Statistics) -> Vec<f64> {
+        let mut z = vec![0.0; r.len()];
+        if function.precondition(r, &mut z) {
+            function.project(&mut z);
+            statistics.preconditioner += 1;
+        } else {
+            z.copy_from_slice(r);
+        }
+        self.orthogonalise(&mut z);
+        z
     }
 
     /// Takes the kept directions out of `z`, in the A-inner product.

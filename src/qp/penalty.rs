@@ -1,6 +1,6 @@
 //! The Hessian P A P + rho Q of the augmented Lagrangian, Q = I - P: one product with A and two projections.
 //!
-//! Preconditioned by P M P + Q / rho, which treats the two invariant subspaces apart as the Hessian does.
+//! The preconditioner is P M P + Q / rho. Like the Hessian it acts on Ker G and on Im G' separately.
 
 use super::axpy;
 use super::mprgp::{Hessian, Point};
@@ -15,7 +15,7 @@ pub(super) struct Penalised<'a> {
 }
 
 impl Penalised<'_> {
-    /// Takes the rounding in Ker G out of the defect, lest the multiplier collects it, rho times enlarged.
+    /// Removes from the defect its part in Ker G, which is rounding. The multiplier would collect it, rho times enlarged.
     pub fn clean(&mut self, point: &mut Point) {
         self.inside.copy_from_slice(&point.defect);
         self.function.project(&mut self.inside);

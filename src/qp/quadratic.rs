@@ -33,8 +33,8 @@ pub trait Projection {
     /// `x = P x`, in place.
     fn project(&mut self, x: &mut [f64]);
 
-    /// `x = P x`, and the squared norm of that, with inner products: of `x` before with each of `against`, then of
-    /// `pairs`. Those who can do it in one collective, do.
+    /// Sets `x = P x`. Returns `|P x|^2`, and inner products: of the unprojected `x` with each of `against`, then of
+    /// `pairs`. To be overridden where one collective can do all.
     fn project_with_products(
         &mut self,
         space: &dyn Space,

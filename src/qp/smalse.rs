@@ -13,7 +13,7 @@
 //! L follows from the gradient, the Q-part of a direction is a by-product of its product: a step costs one product with
 //! A and two projections. Convergence does not depend on the quality of the norm, a few per cent are plenty.
 
-use super::bounds::Bounds;
+use super::feasible::FeasibleSet;
 use super::mprgp::{Expansion, Mprgp, Norms, Point};
 use super::penalty::Penalised;
 use super::quadratic::{Quadratic, Space};
@@ -22,7 +22,7 @@ use super::{Limits, Outcome, Statistics, axpy};
 /// Penalty rho, times the norm. Adds one far cluster of eigenvalues, which does not slow CG (Dostal 2009, section 4.6).
 const PENALTY: f64 = 100.0;
 /// First M, times the norm.
-const BALANCE: f64 = 10.0;
+const RATIO: f64 = 10.0;
 /// Factor by which M shrinks.
 const SHRINK: f64 = 10.0;
 /// First bound eta of the inner tolerance, times the first projected gradient.
@@ -38,8 +38,8 @@ pub struct Problem<'a> {
     pub function: &'a mut dyn Quadratic,
     /// b; only P b matters.
     pub b: &'a [f64],
-    /// l.
-    pub bounds: &'a Bounds,
+    /// { x >= l }.
+    pub set: &'a FeasibleSet,
 }
 
 /// How to solve it.
@@ -85,79 +85,128 @@ pub struct Solution {
 
 /// Solves the problem. Every rank calls this with its own entries.
 pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
-    let Problem { space, function, b, bounds } = problem;
-    let n = b.len();
-    let mut b = b.to_vec();
-    function.project(&mut b);
-    let mut inside = vec![0.0; n];
-    let mut multiplier = start.multiplier.unwrap_or_else(|| vec![0.0; n]);
-    // What is not in Im G' would shift the solution.
-    inside.copy_from_slice(&multiplier);
-    function.project(&mut inside);
-    axpy(-1.0, &inside, &mut multiplier);
-    let mut x = start.x;
-    bounds.project(&mut x);
-
-    let starts_at_zero = space.dot(&x, &x) == 0.0;
-    let (mut target, mut loose, mut first) = (0.0, 0.0, None);
+    let Problem { space, function, b, set } = problem;
+    let Prepared { mut right, mut multiplier, x, inside } = prepare(function, set, b, start);
     let norm = settings.norm;
     let penalty = PENALTY * norm;
-    let mut balance = BALANCE * norm;
-
     let mut hessian = Penalised { function, penalty, inside };
-    let mut inner = Mprgp::new(space, bounds, settings.expansion, penalty, settings.limits.products);
+    let mut inner = Mprgp::new(space, set, settings.expansion, penalty, settings.limits.products);
     let mut statistics = Statistics::default();
-    let mut point = Point { x, gradient: vec![0.0; n], defect: vec![0.0; n], age: 0 };
-    let mut right: Vec<f64> = b.iter().zip(&multiplier).map(|(b, m)| b - m).collect();
-    if starts_at_zero {
-        axpy(-1.0, &right, &mut point.gradient);
-    } else {
-        point.refresh(&mut hessian, &right, &mut statistics);
-    }
+    let mut point = first_point(space, &mut hessian, &right, x, &mut statistics);
 
-    let mut norms = Norms { gradient: f64::NAN, defect: f64::NAN };
+    let mut tests =
+        Tests { limits: settings.limits, norm, ratio: RATIO * norm, first: None, now: UNKNOWN, done: false };
     let mut cost_before = f64::NEG_INFINITY;
     let outcome = loop {
-        let mut done = false;
-        let outcome = inner.minimise(&mut hessian, &right, &mut point, &mut statistics, &mut |now| {
-            norms = now;
-            let first_norm = *first.get_or_insert(now.gradient);
-            target = settings.limits.target(first_norm);
-            loose = (LOOSE * first_norm).max(target);
-            done = now.gradient <= target && norm * now.defect <= target;
-            done || now.gradient <= loose.min(balance * now.defect)
-        });
-        if outcome == Outcome::Converged && done && point.age > AGE {
+        // x: minimise L(x, m, rho) until |g^P| <= min(M |Q x|, eta).
+        tests.done = false;
+        let stop = &mut |now| tests.stop(now);
+        let outcome = inner.minimise(&mut hessian, &right, &mut point, &mut statistics, stop);
+        if outcome == Outcome::Converged && tests.done && point.age > AGE {
             point.refresh(&mut hessian, &right, &mut statistics);
             continue;
         }
+        // M: shrink it where L has risen by less than rho/2 |Q x|^2. L = (x'g - x'b) / 2, with b - m as b.
         hessian.clean(&mut point);
         let d = space.dots(&[(&point.x, &point.gradient), (&point.x, &right)]);
         let cost = 0.5 * (d[0] - d[1]);
-        if cost < cost_before + 0.5 * penalty * norms.defect * norms.defect {
-            balance /= SHRINK;
+        if cost < cost_before + 0.5 * penalty * tests.now.defect * tests.now.defect {
+            tests.ratio /= SHRINK;
         }
         cost_before = cost;
-        // The gradient contains m + rho Q x already.
+        // m: m + rho Q x. The gradient contains this sum already.
         axpy(penalty, &point.defect, &mut multiplier);
-        if outcome != Outcome::Converged || done {
+        if outcome != Outcome::Converged || tests.done {
             break outcome;
         }
         axpy(-penalty, &point.defect, &mut right);
         axpy(penalty, &point.defect, &mut point.gradient);
         statistics.outer += 1;
     };
-    let active = bounds.active(&point.x);
     Solution {
-        active,
+        active: set.active(&point.x),
         x: point.x,
         gradient: point.gradient,
         multiplier,
         outcome,
         statistics,
-        first_norm: first.unwrap_or(f64::NAN),
-        gradient_norm: norms.gradient,
-        defect_norm: norms.defect,
+        first_norm: tests.first.unwrap_or(f64::NAN),
+        gradient_norm: tests.now.gradient,
+        defect_norm: tests.now.defect,
+    }
+}
+
+/// What the loop starts with.
+struct Prepared {
+    /// P b - m.
+    right: Vec<f64>,
+    /// m in Im G': what is not would shift the solution.
+    multiplier: Vec<f64>,
+    /// A feasible x.
+    x: Vec<f64>,
+    /// Work space.
+    inside: Vec<f64>,
+}
+
+/// Projects b, the multiplier and x to where they belong.
+fn prepare(function: &mut dyn Quadratic, set: &FeasibleSet, b: &[f64], start: Start) -> Prepared {
+    let mut b = b.to_vec();
+    function.project(&mut b);
+    let mut multiplier = start.multiplier.unwrap_or_else(|| vec![0.0; b.len()]);
+    let mut inside = multiplier.clone();
+    function.project(&mut inside);
+    axpy(-1.0, &inside, &mut multiplier);
+    let mut x = start.x;
+    set.project(&mut x);
+    let right = b.iter().zip(&multiplier).map(|(b, m)| b - m).collect();
+    Prepared { right, multiplier, x, inside }
+}
+
+/// The start with its gradient, for which x = 0 needs no product.
+fn first_point(
+    space: &dyn Space,
+    hessian: &mut Penalised,
+    right: &[f64],
+    x: Vec<f64>,
+    statistics: &mut Statistics,
+) -> Point {
+    let zero = vec![0.0; x.len()];
+    let starts_at_zero = space.dot(&x, &x) == 0.0;
+    let mut point = Point { x, gradient: zero.clone(), defect: zero, age: 0 };
+    if starts_at_zero {
+        axpy(-1.0, right, &mut point.gradient);
+    } else {
+        point.refresh(hessian, right, statistics);
+    }
+    point
+}
+
+const UNKNOWN: Norms = Norms { gradient: f64::NAN, defect: f64::NAN };
+
+/// When the inner loop stops.
+struct Tests {
+    limits: Limits,
+    /// Norm of P A P.
+    norm: f64,
+    /// M.
+    ratio: f64,
+    /// |g^P| at the start.
+    first: Option<f64>,
+    /// The norms that were tested last.
+    now: Norms,
+    /// Whether the whole problem is solved to the tolerance.
+    done: bool,
+}
+
+impl Tests {
+    /// Whether |g^P| and norm |Q x| are within the tolerance, or |g^P| <= min(M |Q x|, eta).
+    fn stop(&mut self, now: Norms) -> bool {
+        self.now = now;
+        let first = *self.first.get_or_insert(now.gradient);
+        let target = self.limits.target(first);
+        let loose = (LOOSE * first).max(target);
+        self.done = now.gradient <= target && self.norm * now.defect <= target;
+        self.done || now.gradient <= loose.min(self.ratio * now.defect)
     }
 }
 
@@ -174,14 +223,14 @@ mod tests {
         a: Matrix,
         null: Null,
         b: Vec<f64>,
-        bounds: Bounds,
+        set: FeasibleSet,
         settings: Settings,
     }
 
     impl Case {
         fn new(a: Matrix, null: Null, b: Vec<f64>, lower: Vec<f64>) -> Self {
             let settings = Settings { limits: LIMITS, norm: 1.0, expansion: Expansion::ProjectedCg };
-            Self { a, null, b, bounds: Bounds::new(lower), settings }
+            Self { a, null, b, set: FeasibleSet::above(lower), settings }
         }
 
         /// Random, `rows` equalities of which one is redundant, every third entry bounded.
@@ -194,7 +243,7 @@ mod tests {
         }
 
         fn exact(&self) -> Vec<f64> {
-            enumerate(&self.a, &self.b, self.bounds.lower(), &self.null)
+            enumerate(&self.a, &self.b, self.set.lower(), &self.null)
         }
 
         fn from(&mut self, start: Start, preconditioner: Option<&mut Matrix>) -> Solution {
@@ -210,7 +259,7 @@ mod tests {
                     preconditioner: preconditioner.map(|m| m as &mut dyn Operator),
                 },
                 b: &self.b,
-                bounds: &self.bounds,
+                set: &self.set,
             };
             let found = solve(problem, &self.settings, start);
             assert_eq!(self.a.products - before, found.statistics.hessian);
@@ -237,7 +286,7 @@ mod tests {
             assert!(
                 dot(&multiplier, &multiplier).sqrt() < 1e-14 * (1.0 + dot(&found.multiplier, &found.multiplier).sqrt())
             );
-            for (i, lower) in self.bounds.lower().iter().enumerate() {
+            for (i, lower) in self.set.lower().iter().enumerate() {
                 assert_eq!(found.active[i], found.x[i] == *lower);
                 assert!(found.x[i] >= *lower);
                 assert!(if found.active[i] { g[i] > -scale } else { g[i].abs() < scale });
@@ -269,7 +318,7 @@ mod tests {
             let mut case = Case::random(15, 2, 30.0, &mut random);
             let free = enumerate(&case.a, &case.b, &[NONE; 15], &case.null);
             let lower = (0..15).map(|i| if i % 3 == 0 { free[i] - (i % 2) as f64 } else { NONE }).collect();
-            case.bounds = Bounds::new(lower);
+            case.set = FeasibleSet::above(lower);
             let found = case.solve();
             case.check(&found, 1e-8);
             assert!(distance(&found.x, &free) < 1e-6);

@@ -2,8 +2,8 @@
 //! floating parts, orthonormal gluing rows, support rows, contact rows, a coarse right-hand side.
 
 use super::active_set::Face;
-use super::bounds::Bounds;
 use super::dense::{Matrix, Plain, dot};
+use super::feasible::FeasibleSet;
 use super::mprgp::Expansion;
 use super::quadratic::{Operator, Projection, Quadratic};
 use super::smalse::{Problem, Settings, Solution, Start, solve};
@@ -32,59 +32,17 @@ impl Torn {
     /// `parts` x `parts` squares of `cells` x `cells` cells; held at the left side, over an obstacle along the right one,
     /// under a load that turns from down to up.
     pub fn membrane(parts: usize, cells: usize) -> Self {
-        let (side, local) = (cells + 1, (cells + 1) * (cells + 1));
-        let across = parts * cells + 1;
-        // Stiffness of one floating square (five-point, halved at edges), and its regularised inverse.
-        let mut k = Matrix::new(local, vec![0.0; local * local]);
-        let mut spring = |i: usize, j: usize, c: f64| {
-            for (a, b, v) in [(i, i, c), (j, j, c), (i, j, -c), (j, i, -c)] {
-                k.entries[a * local + b] += v;
-            }
-        };
-        let weight = |t: usize| if t == 0 || t == cells { 0.5 } else { 1.0 };
-        for s in 0..side {
-            for t in 0..cells {
-                spring(s * side + t, s * side + t + 1, weight(s));
-                spring(t * side + s, (t + 1) * side + s, weight(s));
-            }
-        }
+        let local = (cells + 1) * (cells + 1);
+        let k = stiffness(cells);
         let mut regular = Matrix::new(local, k.entries.clone());
         regular.entries.iter_mut().for_each(|v| *v += 1.0 / local as f64);
         let inverse = regular.inverse();
+        let Rows { b, gap, bounded } = Rows::of(parts, cells);
 
-        // B: rows of (part, node, value).
-        let mut copies: Vec<Vec<(usize, usize)>> = vec![Vec::new(); across * across];
-        for part in 0..parts * parts {
-            for node in 0..local {
-                let x = part % parts * cells + node % side;
-                let y = part / parts * cells + node / side;
-                copies[y * across + x].push((part, node));
-            }
-        }
-        let (mut b, mut gap, mut bounded) = (Vec::new(), Vec::new(), Vec::new());
-        for (point, copies) in copies.iter().enumerate() {
-            let mean = 1.0 / (copies.len() as f64).sqrt();
-            for m in 1..copies.len() {
-                let size = ((m * (m + 1)) as f64).sqrt();
-                let mut row: Vec<_> = copies[..m].iter().map(|c| (*c, 1.0 / size)).collect();
-                row.push((copies[m], -(m as f64) / size));
-                b.push(row);
-            }
-            if point % across == 0 {
-                b.push(copies.iter().map(|c| (*c, mean)).collect());
-            }
-            gap.resize(b.len(), 0.0);
-            bounded.resize(b.len(), false);
-            if point % across > across - cells {
-                b.push(copies.iter().map(|c| (*c, -mean)).collect());
-                gap.push(0.2 / mean);
-                bounded.push(true);
-            }
-        }
-
+        // F = B K^+ B', B K B', d = B K^+ f - c and G = R'B, part by part.
         let load = |part: usize| if part / parts * 2 < parts { -0.02 } else { 0.03 };
         let n = b.len();
-        let column = |row: &[((usize, usize), f64)], part: usize, a: &Matrix| {
+        let column = |row: &[Coefficient], part: usize, a: &Matrix| {
             let mut v = vec![0.0; local];
             row.iter().filter(|((p, _), _)| *p == part).for_each(|((_, i), value)| v[*i] += value);
             a.times(&v)
@@ -113,6 +71,71 @@ impl Torn {
         }
         let kept = vec![true; n];
         Self { f, d, bounded, preconditioned: false, lumped, rows, kept, basis: Vec::new() }
+    }
+}
+
+/// Stiffness of one floating square: five-point, halved at edges.
+fn stiffness(cells: usize) -> Matrix {
+    let (side, local) = (cells + 1, (cells + 1) * (cells + 1));
+    let mut k = Matrix::new(local, vec![0.0; local * local]);
+    let mut spring = |i: usize, j: usize, c: f64| {
+        for (a, b, v) in [(i, i, c), (j, j, c), (i, j, -c), (j, i, -c)] {
+            k.entries[a * local + b] += v;
+        }
+    };
+    let weight = |t: usize| if t == 0 || t == cells { 0.5 } else { 1.0 };
+    for s in 0..side {
+        for t in 0..cells {
+            spring(s * side + t, s * side + t + 1, weight(s));
+            spring(t * side + s, (t + 1) * side + s, weight(s));
+        }
+    }
+    k
+}
+
+/// A node of a part, and its coefficient.
+type Coefficient = ((usize, usize), f64);
+
+/// The rows of the dual problem.
+struct Rows {
+    b: Vec<Vec<Coefficient>>,
+    gap: Vec<f64>,
+    bounded: Vec<bool>,
+}
+
+impl Rows {
+    /// Gluing of the copies of each point, supports at the left side, contact along the right one.
+    fn of(parts: usize, cells: usize) -> Self {
+        let (side, across) = (cells + 1, parts * cells + 1);
+        let mut copies: Vec<Vec<(usize, usize)>> = vec![Vec::new(); across * across];
+        for part in 0..parts * parts {
+            for node in 0..side * side {
+                let x = part % parts * cells + node % side;
+                let y = part / parts * cells + node / side;
+                copies[y * across + x].push((part, node));
+            }
+        }
+        let (mut b, mut gap, mut bounded) = (Vec::new(), Vec::new(), Vec::new());
+        for (point, copies) in copies.iter().enumerate() {
+            let mean = 1.0 / (copies.len() as f64).sqrt();
+            for m in 1..copies.len() {
+                let size = ((m * (m + 1)) as f64).sqrt();
+                let mut row: Vec<_> = copies[..m].iter().map(|c| (*c, 1.0 / size)).collect();
+                row.push((copies[m], -(m as f64) / size));
+                b.push(row);
+            }
+            if point % across == 0 {
+                b.push(copies.iter().map(|c| (*c, mean)).collect());
+            }
+            gap.resize(b.len(), 0.0);
+            bounded.resize(b.len(), false);
+            if point % across > across - cells {
+                b.push(copies.iter().map(|c| (*c, -mean)).collect());
+                gap.push(0.2 / mean);
+                bounded.push(true);
+            }
+        }
+        Self { b, gap, bounded }
     }
 }
 
@@ -187,7 +210,7 @@ pub fn homogenised(torn: &mut Torn, relative: f64) -> Solution {
     let norm = power::norm(&Plain, torn, &b).expect("an estimate").norm;
     let limits = Limits { relative, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
     let settings = Settings { limits, norm, expansion: Expansion::ProjectedCg };
-    let problem = Problem { space: &Plain, function: torn, b: &b, bounds: &Bounds::new(lower) };
+    let problem = Problem { space: &Plain, function: torn, b: &b, set: &FeasibleSet::above(lower) };
     let mut found = solve(problem, &settings, Start { x: vec![0.0; n], multiplier: None });
     axpy(1.0, &shift, &mut found.x);
     found

@@ -85,7 +85,8 @@ fn mean(values: &HashMap<u64, [f64; 3]>, nodes: &[u64], weights: &[f64]) -> [f64
     std::array::from_fn(|a| nodes.iter().zip(weights).map(|(node, w)| w * values[node][a]).sum())
 }
 
-/// Displacements of some coarse nodes, wherever they are. Of several copies that of the lowest subdomain counts.
+/// Displacements of the needed coarse nodes, from whichever rank has them. Of several copies that of the lowest subdomain
+/// is taken.
 fn fetch(comm: &dyn Comm, subdomains: &[Subdomain], u: &Torn, needed: HashSet<u64>) -> HashMap<u64, [f64; 3]> {
     let ranks = comm.size() as u64;
     let mut reports = vec![Vec::new(); comm.size()];
@@ -109,8 +110,8 @@ fn fetch(comm: &dyn Comm, subdomains: &[Subdomain], u: &Torn, needed: HashSet<u6
     answers.chunks_exact(4).map(|a| (a[0], [a[1], a[2], a[3]].map(f64::from_bits))).collect()
 }
 
-/// Which fine contact pairs are closed: those whose slave node has a closed pair's as the nearest coarse node. `closed`
-/// lists closed coarse pairs of this rank by index. Collective.
+/// Which fine contact pairs are closed: those where the coarse node nearest to the slave node is the slave node of a closed
+/// coarse pair. `closed` are the indices of this rank's closed coarse pairs. Collective.
 fn closed_contacts(
     comm: &dyn Comm,
     coarse: (&[BodyMesh], &[ContactPair]),
@@ -135,8 +136,8 @@ fn closed_contacts(
     fine_pairs.iter().map(|pair| closed.contains(&(pair.contact, nearest(pair.slave)))).collect()
 }
 
-/// Which of the boxes of so many cells of each body of a finer mesh, x fastest, are likely to yield, from where the
-/// coarse one does. Collective.
+/// Which boxes of `cells` cells of each finer body (x fastest) are likely to yield: those around the coarse elements that
+/// yield. Collective.
 fn yielding<'a>(
     comm: &dyn Comm,
     coarse: (&[BodyMesh], &[Subdomain], &Torn),

@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::constraint::law::Status;
 use crate::contact::{ContactPair, MasterNode};
 use crate::decomposition::Subdomain;
 use crate::results::piece::Field;
@@ -20,6 +21,8 @@ pub struct ContactState {
     pub force: f64,
     /// Distance along the normal (length); negative is penetration.
     pub gap: f64,
+    /// Whether the surfaces touch.
+    pub status: Status,
 }
 
 /// All contacts of a scene.
@@ -39,7 +42,7 @@ struct AtNodes {
     pressure: Vec<f64>,
     /// Not a number off the slave surfaces.
     gap: Vec<f64>,
-    /// 1 where a contact is closed, 0 where none is, -1 off the slave surfaces.
+    /// The largest [`Status`] of the node's contacts, -1 off the slave surfaces.
     status: Vec<i64>,
 }
 
@@ -118,7 +121,7 @@ impl<'a> Known<'a> {
                 found.pressure[local] = found.pressure[local].max(self.pressures[state.pair]);
                 // `min` takes the number of a number and none.
                 found.gap[local] = state.gap.min(found.gap[local]);
-                found.status[local] = found.status[local].max(i64::from(state.force > 0.0));
+                found.status[local] = found.status[local].max(state.status as i64);
             }
             let masters = &self.masters[self.masters.partition_point(|master| master.node < node)..];
             let masters = masters.iter().take_while(|master| master.node == node);

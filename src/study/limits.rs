@@ -21,6 +21,7 @@ use super::contact::ContactState;
 use crate::assembly::gradients;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::Kind;
+use crate::constraint::law::Status;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::model::discrete::Discrete;
@@ -76,7 +77,7 @@ pub(super) fn measure(
     let (problem, at, u) = (newton.problem(), newton.at(), &newton.iterate().u);
     let of_nodes = displacements(comm, discrete, u);
     let mut state_of = vec![None; discrete.pairs.len()];
-    contact.iter().for_each(|state| state_of[state.pair] = Some(state.force));
+    contact.iter().for_each(|state| state_of[state.pair] = Some(state.status));
     let mut partial = Vec::new();
     let subdomains = problem.subdomains.iter().zip(u).zip(problem.space.owned());
     for ((subdomain, u), rows) in subdomains {
@@ -84,7 +85,7 @@ pub(super) fn measure(
         add_body(&mut worst, subdomain, u, diagonal(&discrete.extents[subdomain.body]));
         for &row in rows {
             let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind else { continue };
-            if state_of[pair].is_some_and(|force| force > 0.0) {
+            if state_of[pair].is_some_and(Status::is_closed) {
                 add_contact(&mut worst, scene, discrete, pair, at, &of_nodes);
             }
         }

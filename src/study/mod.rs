@@ -144,8 +144,7 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
         }
         Begin::After(Earlier { committed, u }) => {
             let closed = ROUNDING * committed.sizes.displacement;
-            let rows = problem.constraints.rows.iter().zip(problem.slack(&u));
-            let held = rows.map(|(row, slack)| !row.is_inequality() || slack <= closed).collect();
+            let held = problem.constraints.laws().kept_at(&problem.slack(&u), closed);
             problem.committed = committed;
             newton::Begin::Near(newton::Start { u, held })
         }

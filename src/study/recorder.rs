@@ -52,6 +52,6 @@ impl<'a> Recorder<'a> {
         let contact = report::contact_states(newton.problem(), newton.iterate());
         let von_mises = fields::record(&mut self.piece, newton, discrete.touching(), &contact);
         self.rows.push(report::step_row(comm, scene, discrete, newton, &contact, von_mises));
-        self.closed = contact.iter().filter(|state| state.force > 0.0).map(|state| state.pair as u64).collect();
+        self.closed = contact.iter().filter(|state| state.status.is_closed()).map(|state| state.pair as u64).collect();
     }
 }

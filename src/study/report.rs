@@ -107,7 +107,8 @@ pub(super) fn contact_states(problem: &TornProblem, Iterate { u, lambda, .. }: &
     let rows = problem.constraints.rows.iter().zip(&slack).zip(lambda);
     rows.filter_map(|((row, slack), lambda)| {
         let Kind::Contact { pair } = row.kind else { return None };
-        Some(ContactState { pair, force: row.scale * lambda, gap: slack / row.scale })
+        let force = row.scale * lambda;
+        Some(ContactState { pair, force, gap: slack / row.scale, status: row.law().status(force) })
     })
     .collect()
 }

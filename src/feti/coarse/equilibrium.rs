@@ -46,7 +46,7 @@ pub fn check(
     stages: usize,
     resultants: impl Fn(usize) -> Vec<f64>,
 ) -> Result<(), Box<Unheld>> {
-    let is_contact = |row: usize| constraints.rows[row].is_inequality();
+    let is_contact = |row: usize| !constraints.rows[row].law().always_holds();
     let motions = coarse.motions();
     let free = coarse.free(|row| !is_contact(row));
     if free.is_empty() {

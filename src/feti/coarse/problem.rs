@@ -91,7 +91,7 @@ impl<'a> Coarse<'a> {
                 for (slot, six) in constraints.slots(row).zip(values.as_chunks::<MODES>().0) {
                     let cluster = clusters.of(constraints.slot_subdomain[slot] as usize) as u32;
                     // Copies of one node, unless it is contact.
-                    if !constraints.rows[row].is_inequality() && slot_cluster[begin..].last() == Some(&cluster) {
+                    if constraints.rows[row].law().always_holds() && slot_cluster[begin..].last() == Some(&cluster) {
                         let sum: &mut [f64; MODES] = slot_modes.last_mut().expect("it has a cluster");
                         sum.iter_mut().zip(six).for_each(|(s, x)| *s += x);
                     } else {
@@ -103,7 +103,7 @@ impl<'a> Coarse<'a> {
                     slot_cluster.truncate(begin);
                     slot_modes.truncate(begin);
                 }
-                let acting = &mut acting[usize::from(constraints.rows[row].is_inequality())];
+                let acting = &mut acting[usize::from(!constraints.rows[row].law().always_holds())];
                 for (slot, &cluster) in (begin..).zip(&slot_cluster[begin..]) {
                     if let Some(own) = (cluster as usize).checked_sub(first).filter(|&own| own < acting.len()) {
                         acting[own].push(Acting { row: row as u32, modes: slot_modes[slot] });

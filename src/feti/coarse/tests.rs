@@ -50,7 +50,7 @@ fn a_restricted_coarse_problem_knows_the_kept_rows_only() {
     for scene in [two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7)] {
         on_ranks(&scene, 1, |setup| {
             let (mut g, coarse) = (dense_coarse(setup), setup.coarse().expect("the bodies are held"));
-            let kept: Vec<bool> = setup.rows().iter().map(|row| !row.is_inequality()).collect();
+            let kept: Vec<bool> = setup.rows().iter().map(|row| row.law().always_holds()).collect();
             for row in (0..kept.len()).filter(|&row| !kept[row]) {
                 g.col_mut(row).fill(0.0);
             }

@@ -18,7 +18,7 @@ impl Coupling {
     /// Of the rows of this rank.
     pub fn new(constraints: &Constraints) -> Self {
         let contacts = |rows: &std::ops::Range<usize>| -> Vec<usize> {
-            rows.clone().filter(|&row| constraints.rows[row].is_inequality()).collect()
+            rows.clone().filter(|&row| !constraints.rows[row].law().always_holds()).collect()
         };
         let several = constraints.blocks.iter().map(contacts).filter(|rows| rows.len() > 1);
         Self {
@@ -41,12 +41,13 @@ impl Coupling {
     /// does so. Local.
     ///
     /// Coupled rows that are violated are closed; where that violates others these are closed too.
-    pub fn close(&mut self, slack: &[f64], x: &mut [f64]) {
+    pub fn close(&mut self, constraints: &Constraints, slack: &[f64], x: &mut [f64]) {
+        let depth = |row: usize, slack: f64| constraints.rows[row].law().violation(slack).abs();
         x.iter_mut().zip(&self.squares).for_each(|(x, square)| *x /= square);
         for gram in &mut self.grams {
             let rows = gram.rows().to_vec();
-            let deepest = rows.iter().fold(0.0_f64, |deepest, &row| deepest.max(-slack[row]));
-            let mut closed: Vec<bool> = rows.iter().map(|&row| slack[row] < 0.0).collect();
+            let deepest = rows.iter().fold(0.0_f64, |deepest, &row| deepest.max(depth(row, slack[row])));
+            let mut closed: Vec<bool> = rows.iter().map(|&row| depth(row, slack[row]) > 0.0).collect();
             rows.iter().for_each(|&row| x[row] = 0.0);
             while closed.contains(&true) {
                 let is_closed = |row: usize| closed[rows.binary_search(&row).expect("of this block")];
@@ -55,8 +56,8 @@ impl Coupling {
                 let mut left: Vec<f64> = rows.iter().map(|&row| slack[row]).collect();
                 gram.subtract_product(x, &mut left);
                 let mut grown = false;
-                for (closed, left) in closed.iter_mut().zip(left) {
-                    let joins = !*closed && left < -ROUNDING * deepest;
+                for ((closed, left), &row) in closed.iter_mut().zip(left).zip(&rows) {
+                    let joins = !*closed && depth(row, left) > ROUNDING * deepest;
                     *closed |= joins;
                     grown |= joins;
                 }
@@ -85,7 +86,7 @@ mod tests {
             // Many rows are violated, others nearly.
             let slack: Vec<f64> = setup.multipliers(3).iter().map(|&s| if s > 0.0 { 1e-3 * s } else { s }).collect();
             let mut x = vec![0.0; slack.len()];
-            coupling.close(&slack, &mut x);
+            coupling.close(&setup.discrete.constraints, &slack, &mut x);
             let (mut torn, mut taken) = (setup.gather.zeros(), slack.clone());
             setup.gather.add_transpose(1.0, &x, &mut torn);
             setup.gather.apply(&torn, &mut taken);

@@ -58,7 +58,7 @@ impl Held<'_> {
         let mut carried = vec![0.0; self.gather.rows()];
         self.gather.apply(&left, &mut carried);
         for lambda in multipliers {
-            self.constraints.add_forces(&carried, |kind| !matches!(kind, Kind::Contact { .. }), lambda);
+            self.constraints.add_forces(&carried, |kind| !kind.is_contact(), lambda);
         }
     }
 

@@ -88,7 +88,7 @@ impl Scaling {
 
 /// Whether rows of a block may come and go.
 fn changes(constraints: &Constraints, rows: Range<usize>) -> bool {
-    constraints.rows[rows].iter().any(|row| row.is_inequality())
+    constraints.rows[rows].iter().any(|row| !row.law().always_holds())
 }
 
 /// `B D^-1 B'` of one block, zero in the rows that are not kept.

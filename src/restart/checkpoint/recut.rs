@@ -37,7 +37,7 @@ pub(super) fn read(
     let of_contacts: HashMap<[i64; 3], usize> =
         (0..rows.len()).filter_map(|row| Some((contact(discrete, row)?, row))).collect();
     let contacts = Wanted::find(arrays, "contacts/condition", |key| of_contacts.get(&key).copied())?;
-    let mut kept: Vec<bool> = rows.iter().map(|row| !row.is_inequality()).collect();
+    let mut kept: Vec<bool> = rows.iter().map(|row| row.law().always_holds()).collect();
     let mut reached_lambda = vec![0.0; rows.len()];
     let states = contacts.read::<i64>(arrays, "contacts/kept", 0)?;
     let forces = contacts.read::<f64>(arrays, "contacts/last_force", 0)?;

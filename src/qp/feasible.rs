@@ -1,26 +1,35 @@
 //! The feasible set { x >= l } and what a gradient means on it.
 //!
+//! The solvers know the set by the methods of [`FeasibleSet`] only: projection, step, longest step, active entries, split
+//! gradient. A product of other convex sets (discs, for multipliers of friction) would answer the same questions here.
+//!
 //! Notation of Dostal, Optimal Quadratic Programming Algorithms (2009), chapter 5: free gradient phi, chopped gradient
 //! beta, reduced free gradient phi~. An entry is active if it *equals* its bound: every move of x goes through
-//! [`Bounds::advance`], which puts entries onto the bound that are above it by no more than the rounding of that very
+//! [`FeasibleSet::advance`], which puts entries onto the bound that are above it by no more than the rounding of that very
 //! move. So the activity test needs no tolerance, and round-off cannot free an entry.
 
 /// An entry this many roundings (of the numbers that it was computed from) above its bound is put onto it.
 const SNAP: f64 = 16.0 * f64::EPSILON;
 
-/// Lower bounds, minus infinity where there is none.
+/// The vectors above some lower bounds, which are minus infinity where there is none.
 #[derive(Clone, Debug)]
-pub struct Bounds {
+pub struct FeasibleSet {
     lower: Vec<f64>,
 }
 
-impl Bounds {
-    /// Bounds of every entry.
-    pub fn new(lower: Vec<f64>) -> Self {
+impl FeasibleSet {
+    /// { x >= lower }.
+    pub fn above(lower: Vec<f64>) -> Self {
         Self { lower }
     }
 
+    /// How many entries its vectors have.
+    pub fn dimension(&self) -> usize {
+        self.lower.len()
+    }
+
     /// The bounds, one per entry.
+    #[cfg(test)]
     pub fn lower(&self) -> &[f64] {
         &self.lower
     }
@@ -73,7 +82,7 @@ impl Bounds {
     }
 }
 
-/// A gradient split by [`Bounds::split`].
+/// A gradient split by [`FeasibleSet::split`].
 pub struct Parts {
     /// The gradient on the free set.
     pub free: Vec<f64>,
@@ -104,32 +113,32 @@ mod tests {
     #[test]
     fn rounding_is_put_onto_the_bound_whatever_the_scale() {
         for scale in [1e-9, 1.0, 1e9] {
-            let bounds = Bounds::new(vec![0.1 * scale, NONE]);
+            let set = FeasibleSet::above(vec![0.1 * scale, NONE]);
             let mut x = vec![0.3 * scale, 0.3 * scale];
             let p = vec![0.7 * scale, 0.7 * scale];
-            let step = bounds.reach(&x, &p);
-            bounds.advance(&mut x, step, &p);
-            assert_eq!(bounds.active(&x), [true, false]);
+            let step = set.reach(&x, &p);
+            set.advance(&mut x, step, &p);
+            assert_eq!(set.active(&x), [true, false]);
             assert_eq!(x[0], 0.1 * scale);
         }
     }
 
     #[test]
     fn zero_bound_is_met_exactly_by_a_step_of_the_reach() {
-        let bounds = Bounds::new(vec![0.0]);
+        let set = FeasibleSet::above(vec![0.0]);
         for k in 1..200 {
             let (mut x, p) = (vec![1.0 / f64::from(k)], vec![f64::from(k).sqrt()]);
-            let step = bounds.reach(&x, &p);
-            bounds.advance(&mut x, step, &p);
+            let step = set.reach(&x, &p);
+            set.advance(&mut x, step, &p);
             assert_eq!(x, [0.0]);
         }
     }
 
     #[test]
     fn gradient_parts() {
-        let bounds = Bounds::new(vec![0.0, 0.0, 0.0, NONE]);
+        let set = FeasibleSet::above(vec![0.0, 0.0, 0.0, NONE]);
         let mut parts = Parts::new(4);
-        bounds.split(&[0.0, 0.0, 0.25, -5.0], &[1.0, -2.0, 3.0, 4.0], 0.5, &mut parts);
+        set.split(&[0.0, 0.0, 0.25, -5.0], &[1.0, -2.0, 3.0, 4.0], 0.5, &mut parts);
         assert_eq!(parts.free, [0.0, 0.0, 3.0, 4.0]);
         assert_eq!(parts.chopped, [0.0, -2.0, 0.0, 0.0]);
         assert_eq!(parts.reduced, [0.0, 0.0, 0.5, 4.0]);
@@ -137,9 +146,9 @@ mod tests {
 
     #[test]
     fn nan_is_not_hidden_by_a_bound() {
-        let bounds = Bounds::new(vec![0.0]);
+        let set = FeasibleSet::above(vec![0.0]);
         let mut x = vec![1.0];
-        bounds.advance(&mut x, f64::NAN, &[1.0]);
+        set.advance(&mut x, f64::NAN, &[1.0]);
         assert!(x[0].is_nan());
     }
 }

@@ -1,0 +1,320 @@
+//! The law of a row: which multipliers it admits, and when the row holds.
+//!
+//! A law is the set `Lambda` of admissible multipliers. At the solution the multiplier is in `Lambda`, and the slack
+//! `s = c - B u` is such that `-s` is normal to `Lambda` there:
+//!
+//! ```text
+//! equality      (gluing, support)         Lambda = R           s = 0
+//! unilateral    (contact, no friction)    Lambda = [0, inf)    s >= 0,   lambda s = 0
+//! ```
+//!
+//! (Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008), section 2.) A row is *kept* where its multiplier may
+//! act: always if it is an equality, where it is closed if it is a contact.
+//!
+//! This is the only file that knows the sign of a contact's multiplier. Multipliers and slacks are those of the rows, or
+//! both in physical units: the scale of a row is positive and changes no answer.
+//!
+//! [`Law`] answers for one row, [`Laws`] for all rows of a rank. A law speaks of the rows of one node in one contact.
+//! Without friction that is one row, the normal one. A disc or a cone of tangential multipliers is a law of several rows;
+//! [`Laws`] is where rows become groups, and those who ask it for whole vectors do not see the difference.
+
+use super::{Constraints, Kind, Row};
+
+/// Which multipliers a row admits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Law {
+    /// Any multiplier: the row is an equality.
+    Equality,
+    /// Multipliers that are not negative: surfaces push and do not pull.
+    Unilateral,
+}
+
+/// Whether surfaces touch. The numbers are those of the field `contact_status` in result files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Status {
+    /// No force.
+    Open = 0,
+    /// A force.
+    Closed = 1,
+}
+
+impl Status {
+    /// Whether the surfaces exert a force on each other.
+    pub fn is_closed(self) -> bool {
+        self != Self::Open
+    }
+}
+
+impl Law {
+    /// Whether the row is kept whatever its multiplier: an equality. Other rows come and go.
+    pub fn always_holds(self) -> bool {
+        self == Self::Equality
+    }
+
+    /// Whether a row of this multiplier is kept. Multipliers up to `rounding` are none.
+    pub fn is_kept(self, lambda: f64, rounding: f64) -> bool {
+        match self {
+            Self::Equality => true,
+            Self::Unilateral => lambda > rounding,
+        }
+    }
+
+    /// Whether a row of this slack is kept. Slacks up to `rounding` are none.
+    pub fn is_kept_at(self, slack: f64, rounding: f64) -> bool {
+        match self {
+            Self::Equality => true,
+            Self::Unilateral => slack <= rounding,
+        }
+    }
+
+    /// Whether the surfaces touch that exert this multiplier on each other.
+    pub fn status(self, lambda: f64) -> Status {
+        if self.is_kept(lambda, 0.0) { Status::Closed } else { Status::Open }
+    }
+
+    /// The admissible multiplier next to this one.
+    pub fn project(self, lambda: f64) -> f64 {
+        match self {
+            Self::Equality => lambda,
+            Self::Unilateral => lambda.max(0.0),
+        }
+    }
+
+    /// Distance of a multiplier from the admissible ones.
+    pub fn distance(self, lambda: f64) -> f64 {
+        match self {
+            Self::Equality => 0.0,
+            Self::Unilateral => (-lambda).max(0.0),
+        }
+    }
+
+    /// Lower bound of `lambda - start`; minus infinity if there is none.
+    pub fn lower_bound(self, start: f64) -> f64 {
+        match self {
+            Self::Equality => f64::NEG_INFINITY,
+            Self::Unilateral => -start,
+        }
+    }
+
+    /// The part of the slack that violates the row: all of an equality's, a contact's penetration (negative).
+    pub fn violation(self, slack: f64) -> f64 {
+        match self {
+            Self::Equality => slack,
+            Self::Unilateral => slack.min(0.0),
+        }
+    }
+
+    /// Whether the row resists a motion that changes `B u` by `moved`. Changes up to `rounding` are none.
+    pub fn resists(self, moved: f64, rounding: f64) -> bool {
+        match self {
+            Self::Equality => moved.abs() > rounding,
+            Self::Unilateral => moved > rounding,
+        }
+    }
+}
+
+impl Row {
+    /// Its law.
+    pub fn law(&self) -> Law {
+        match self.kind {
+            Kind::Gluing | Kind::Support { .. } => Law::Equality,
+            Kind::Contact { .. } => Law::Unilateral,
+        }
+    }
+}
+
+impl Constraints {
+    /// The laws of all rows of this rank.
+    pub fn laws(&self) -> Laws<'_> {
+        Laws { rows: &self.rows }
+    }
+}
+
+/// The laws of all rows of a rank. Vectors are as long as there are rows.
+#[derive(Clone, Copy)]
+pub struct Laws<'a> {
+    rows: &'a [Row],
+}
+
+impl Laws<'_> {
+    /// Rows that come and go with their multipliers.
+    pub fn may_open(self) -> Vec<bool> {
+        self.rows.iter().map(|row| !row.law().always_holds()).collect()
+    }
+
+    /// Rows that are kept at these multipliers. Multipliers up to `rounding` are none.
+    pub fn kept(self, lambda: &[f64], rounding: f64) -> Vec<bool> {
+        self.rows.iter().zip(lambda).map(|(row, &lambda)| row.law().is_kept(lambda, rounding)).collect()
+    }
+
+    /// Rows that are kept at these slacks. Slacks up to `rounding` are none.
+    pub fn kept_at(self, slack: &[f64], rounding: f64) -> Vec<bool> {
+        self.rows.iter().zip(slack).map(|(row, &slack)| row.law().is_kept_at(slack, rounding)).collect()
+    }
+
+    /// Makes multipliers admissible, each the next one.
+    pub fn project(self, lambda: &mut [f64]) {
+        self.rows.iter().zip(lambda).for_each(|(row, lambda)| *lambda = row.law().project(*lambda));
+    }
+
+    /// Makes multipliers admissible where rows are kept, and zero elsewhere.
+    pub fn project_onto(self, kept: &[bool], lambda: &mut [f64]) {
+        for ((row, lambda), &kept) in self.rows.iter().zip(lambda).zip(kept) {
+            *lambda = if kept { row.law().project(*lambda) } else { 0.0 };
+        }
+    }
+
+    /// The largest distance of a multiplier from the admissible ones, on this rank.
+    pub fn distance(self, lambda: &[f64]) -> f64 {
+        self.rows.iter().zip(lambda).fold(0.0, |most, (row, &lambda)| most.max(row.law().distance(lambda)))
+    }
+
+    /// Lower bounds of `lambda - start`, minus infinity where there is none.
+    pub fn lower_bounds(self, start: &[f64]) -> Vec<f64> {
+        self.rows.iter().zip(start).map(|(row, &start)| row.law().lower_bound(start)).collect()
+    }
+
+    /// Leaves of slacks what violates the rows.
+    pub fn violation(self, slack: &mut [f64]) {
+        self.rows.iter().zip(slack).for_each(|(row, slack)| *slack = row.law().violation(*slack));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::fs;
+    use std::path::Path;
+
+    use super::*;
+
+    const LAWS: [Law; 2] = [Law::Equality, Law::Unilateral];
+    const NUMBERS: [f64; 7] = [-2.0, -0.5, -0.0, 0.0, 1e-9, 0.75, 3.0];
+
+    #[test]
+    fn the_projection_is_the_nearest_admissible_multiplier() {
+        for law in LAWS {
+            for lambda in NUMBERS {
+                let nearest = law.project(lambda);
+                assert_eq!((law.distance(nearest), law.project(nearest)), (0.0, nearest), "it is admissible");
+                assert_eq!((nearest - lambda).abs(), law.distance(lambda));
+                let nearer =
+                    |other: &f64| law.distance(*other) == 0.0 && (other - lambda).abs() < (nearest - lambda).abs();
+                assert!(!NUMBERS.iter().any(nearer), "{law:?} {lambda}");
+                // In terms of `lambda - start` the bound is the admissible set's.
+                let bound = law.lower_bound(0.25);
+                assert_eq!(lambda - 0.25 >= bound, law.distance(lambda) == 0.0, "{law:?} {lambda}");
+            }
+        }
+    }
+
+    /// `lambda = project(lambda - s)` says the same as the conditions of complementarity, in one equation.
+    #[test]
+    fn multiplier_and_slack_of_a_solution_are_a_fixed_point_of_the_projection() {
+        for law in LAWS {
+            for lambda in NUMBERS {
+                for slack in NUMBERS {
+                    let solves = law.project(lambda - slack) == lambda;
+                    let expected = law.distance(lambda) == 0.0
+                        && law.violation(slack) == 0.0
+                        && (law.always_holds() || lambda * slack == 0.0);
+                    assert_eq!(solves, expected, "{law:?} {lambda} {slack}");
+                    // What is kept by its multiplier is so by its slack.
+                    assert!(!solves || !law.is_kept(lambda, 0.0) || law.is_kept_at(slack, 0.0));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn contact_is_closed_by_pushes_and_resists_what_closes_it() {
+        assert_eq!([-1.0, 0.0, 1.0].map(|l| Law::Unilateral.status(l)), [Status::Open, Status::Open, Status::Closed]);
+        assert_eq!([-1.0, 0.0, 1.0].map(|m| Law::Unilateral.resists(m, 0.5)), [false, false, true]);
+        assert_eq!([-1.0, 0.0, 1.0].map(|m| Law::Equality.resists(m, 0.5)), [true, false, true]);
+        assert!(Status::Open < Status::Closed, "a node of several contacts shows the larger");
+    }
+
+    #[test]
+    fn rounding_neither_closes_nor_opens() {
+        assert!(Law::Unilateral.is_kept(2.0, 1.0) && !Law::Unilateral.is_kept(0.5, 1.0));
+        assert!(Law::Unilateral.is_kept_at(0.5, 1.0) && !Law::Unilateral.is_kept_at(2.0, 1.0));
+        assert!(Law::Equality.is_kept(-3.0, 1.0) && Law::Equality.is_kept_at(2.0, 1.0));
+    }
+
+    /// Code of the library without its tests, by path.
+    fn sources(directory: &Path) -> Vec<(String, String)> {
+        let mut found = Vec::new();
+        for entry in fs::read_dir(directory).expect("sources can be read") {
+            let path = entry.expect("sources can be read").path();
+            if path.is_dir() {
+                found.extend(sources(&path));
+            } else if path.extension().is_some_and(|end| end == "rs") && path.file_stem().is_some_and(|s| s != "tests")
+            {
+                let text = fs::read_to_string(&path).expect("sources can be read");
+                let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default().to_owned();
+                let name = path.strip_prefix(env!("CARGO_MANIFEST_DIR")).expect("it is below").display().to_string();
+                found.push((name, code));
+            }
+        }
+        found
+    }
+
+    fn library() -> Vec<(String, String)> {
+        sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
+    }
+
+    /// The files that CONTRIBUTING.md names in its section on contact laws.
+    fn listed() -> BTreeSet<String> {
+        let text = include_str!("../../CONTRIBUTING.md");
+        let section = text.split_once("### A contact law\n").expect("there is such a section").1;
+        let section = section.split("\n#").next().unwrap_or_default();
+        section.split('`').filter(|word| word.starts_with("src/")).map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn contributing_lists_the_files_that_a_contact_law_touches() {
+        let asks = |code: &str| {
+            let words = [".law()", ".laws()", "constraint::law", "pub mod law;", "is_contact()", "Kind::Contact"];
+            words.iter().any(|word| code.contains(word))
+        };
+        let asking: BTreeSet<String> =
+            library().into_iter().filter(|(_, code)| asks(code)).map(|(name, _)| name).collect();
+        let solvers = ["src/qp/feasible.rs", "src/qp/active_set.rs", "src/newton/damping.rs"].map(str::to_owned);
+        let expected: BTreeSet<String> = asking.into_iter().chain(solvers).collect();
+        assert_eq!(listed(), expected, "left: CONTRIBUTING.md, right: the sources");
+    }
+
+    /// The usual ways to write it down a second time.
+    #[test]
+    fn the_sign_of_contact_is_known_here_only() {
+        let words = [
+            "is_inequality",
+            "Law::Unilateral",
+            "lambda > 0.0",
+            "lambda >= 0.0",
+            "lambda.max(0.0)",
+            "l > 0.0",
+            "l.max(0.0)",
+            "force > 0.0",
+            "slack < 0.0",
+            "slack <= 0.0",
+            "slack[row] < 0.0",
+            "slack.min(0.0)",
+            "gap.min(0.0)",
+            "(-gap).max(0.0)",
+        ];
+        let elsewhere = library().into_iter().filter(|(name, _)| name != "src/constraint/law.rs");
+        for (name, code) in elsewhere {
+            let code = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+            for line in code {
+                assert!(!words.iter().any(|word| contains(line, word)), "{name}: {line}");
+            }
+        }
+    }
+
+    /// Whether a line has this text, which begins with a whole word.
+    fn contains(line: &str, text: &str) -> bool {
+        let part_of_name = |c: char| c.is_alphanumeric() || c == '_';
+        line.match_indices(text).any(|(at, _)| !line[..at].ends_with(part_of_name))
+    }
+}
