@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
-use fetiplast::assembly::stiffness;
+use fetiplast::assembly::{Region, stiffness};
 use fetiplast::comm::solo::Solo;
 use fetiplast::decomposition::Subdomain;
 use fetiplast::feti::coarse::Coarse;
@@ -79,8 +79,9 @@ fn subdomain(cells: usize) {
     let pattern = &symbolic[0].pattern;
     let mut values = vec![0.0; pattern.rows.len()];
     let rest = vec![0.0; pattern.dofs()];
+    let region = Region::virgin(&subdomains[0], &materials[0]);
     let assembly = best(200, || {
-        stiffness::assemble(&subdomains[0], &materials[0], &[], (&rest, &[]), pattern, &mut values);
+        stiffness::assemble(&region, (&rest, &[]), pattern, &mut values);
     });
     for precision in [Precision::Single, Precision::Double] {
         let mut factors = Factors::new(symbolic.clone(), precision);

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use super::stiffness;
+use super::{Region, stiffness};
 use crate::decomposition::{Bodies, Shape, Subdomain, number_bodies};
 use crate::element::Kind;
 use crate::element::sample::{Sample, samples};
@@ -57,7 +57,7 @@ pub fn displacement(
 ) -> Vec<f64> {
     let pattern = Pattern::new(cube.nodes.len(), &cube.elements, &[]);
     let mut k = vec![0.0; pattern.rows.len()];
-    stiffness::assemble(cube, &MATERIAL, &[], (&vec![0.0; cube.dofs()], &[]), &pattern, &mut k);
+    stiffness::assemble(&Region::virgin(cube, &MATERIAL), (&vec![0.0; cube.dofs()], &[]), &pattern, &mut k);
     let mut f = vec![0.0; cube.dofs()];
     for nodes in &cube.elements {
         let places: Vec<[f64; 3]> = nodes.iter().map(|&n| cube.points[n as usize]).collect();

@@ -36,6 +36,11 @@ pub struct History {
     pub kappa: f64,
 }
 
+impl History {
+    /// The virgin state.
+    pub const VIRGIN: Self = Self { plastic_strain: [0.0; 6], kappa: 0.0 };
+}
+
 /// What a material point answers to a strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {

@@ -104,16 +104,11 @@ impl StepSolver<'_> {
             timer.time("certificate", || self.operator.factors.solve(&mut correction));
             let mut partial = Vec::with_capacity(4 * u.len());
             timer.time("certificate", || {
-                for (own, subdomain) in problem.subdomains.iter().enumerate() {
-                    let (material, history) = (&problem.materials[own], problem.committed.history(own));
-                    let moved = if solves == 1 {
-                        0.0
-                    } else {
-                        internal::divergence(subdomain, material, history, &v[own], &change[own])
-                    };
+                for (own, region) in problem.regions().iter().enumerate() {
+                    let moved = if solves == 1 { 0.0 } else { internal::divergence(region, &v[own], &change[own]) };
                     let worked = -dot(&rho[own], &change[own]);
                     let square = (1.0 + FACTORS) * dot(&rho[own], &correction[own]);
-                    let weighted = if square > 0.0 { square / material.least_tangent() } else { 0.0 };
+                    let weighted = if square > 0.0 { square / region.material.least_tangent() } else { 0.0 };
                     partial.extend([moved, worked, square, weighted]);
                 }
             });
@@ -127,12 +122,11 @@ impl StepSolver<'_> {
                 break;
             }
             timer.time("certificate", || {
-                for (own, subdomain) in problem.subdomains.iter().enumerate() {
+                for (own, region) in problem.regions().iter().enumerate() {
                     v[own].iter_mut().zip(&correction[own]).for_each(|(v, c)| *v += c);
                     change[own].iter_mut().zip(&correction[own]).for_each(|(d, c)| *d -= c);
-                    let (material, history) = (&problem.materials[own], problem.committed.history(own));
                     let mut forces = vec![0.0; v[own].len()];
-                    internal::add_forces(subdomain, material, history, &v[own], &mut forces);
+                    internal::add_forces(region, &v[own], &mut forces);
                     rho[own].clone_from(&problem.loads[own]);
                     rho[own].iter_mut().zip(forces).for_each(|(r, f)| *r -= f);
                 }

@@ -288,8 +288,11 @@ fn decomposition(scene: &Scene) -> Checked {
             let rule = format!("each material of each body needs at least one, which are {regions}");
             require(subdomains >= regions, key, subdomains, rule)?;
             // Elements of mesh files are counted when these are read.
-            let per_body: Option<Vec<usize>> =
-                scene.body.values().map(|b| Some(b.brick()?.cell_count() * b.element.per_cell())).collect();
+            let per_body: Option<Vec<usize>> = scene
+                .body
+                .values()
+                .map(|b| Some(b.brick()?.cell_count() * b.element.cell().per_hexahedron() as usize))
+                .collect();
             let Some(per_body) = per_body else { return Ok(()) };
             let elements = per_body.into_iter().fold(0_usize, usize::saturating_add);
             require(subdomains <= elements, key, subdomains, format!("there are only {elements} elements to share out"))

@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-pub use body::{Axis, Body, Brick, Element, Gmsh, Rotation, Shape};
+pub use body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
 pub use changes::changes;
 pub use contact::{Contact, Obstacle, Sides};
 pub use decomposition::{Decomposition, Method, PAPER_CELLS};

@@ -3,8 +3,8 @@
 use super::run::{Exact, Run};
 use super::{Case, Demand, Error, effectivity, material_line, orders};
 use crate::analytic::manufactured::Manufactured;
+use crate::element::Kind;
 use crate::material::Material;
-use crate::scene::Element;
 use crate::tensor::Voigt;
 
 /// A solution and what acts on it.
@@ -106,10 +106,10 @@ impl Case for Smooth {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         match element {
-            Element::Tet10 => vec![2, 4, 8],
-            Element::Tet4 | Element::Hex8 => vec![4, 8, 16],
+            Kind::Tet10 => vec![2, 4, 8],
+            Kind::Tet4 | Kind::Hex8 => vec![4, 8, 16],
         }
     }
 

@@ -5,8 +5,8 @@ use super::run::{Run, pressure_error};
 use super::{Case, Demand, Error, PAPER, effectivity, material_line, orders};
 use crate::analytic::hollow_sphere::{HollowSphere, SphereState, Unloaded};
 use crate::analytic::nested_spheres::NestedSpheres;
+use crate::element::Kind;
 use crate::material::{History, Material};
-use crate::scene::Element;
 
 /// The sphere that takes the pressure.
 const SPHERE: HollowSphere = HollowSphere { inner: 100.0, outer: 200.0, material: PAPER };
@@ -44,10 +44,10 @@ pub(super) fn symmetry(body: &str) -> String {
     ["x", "y", "z"].map(plane).concat()
 }
 
-fn levels(element: Element) -> Vec<usize> {
+fn levels(element: Kind) -> Vec<usize> {
     match element {
-        Element::Tet10 => vec![2, 4, 8],
-        Element::Tet4 | Element::Hex8 => vec![4, 8, 16],
+        Kind::Tet10 => vec![2, 4, 8],
+        Kind::Tet4 | Kind::Hex8 => vec![4, 8, 16],
     }
 }
 
@@ -76,7 +76,7 @@ impl Case for Hollow {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         levels(element)
     }
 
@@ -120,12 +120,12 @@ pub(super) fn distance(x: [f64; 3]) -> f64 {
 
 /// What the better elements owe.
 fn within_a_percent(run: &Run) -> Demand {
-    if run.element() == Element::Tet4 { Demand::Shown } else { Demand::Finest(0.01) }
+    if run.element() == Kind::Tet4 { Demand::Shown } else { Demand::Finest(0.01) }
 }
 
 /// Linear elements yield as a whole: they know the front to half a cell.
 fn of_front(run: &Run) -> Demand {
-    if run.element() == Element::Tet10 { Demand::Finest(0.01) } else { Demand::Shown }
+    if run.element() == Kind::Tet10 { Demand::Finest(0.01) } else { Demand::Shown }
 }
 
 /// Relative error of the radius of a sphere that holds as much yielding volume as was found in the first body.
@@ -171,7 +171,7 @@ impl Case for Nested {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         levels(element)
     }
 

@@ -1,4 +1,4 @@
-use crate::assembly::stress;
+use crate::assembly::{Region, stress};
 use crate::comm::threads;
 use crate::fixture::{not_matching, two_bricks, two_meshes};
 use crate::model;
@@ -22,7 +22,7 @@ fn solve(scene: &Scene, ranks: usize) -> Solution {
         let mut stresses = Vec::new();
         for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(&solved.u) {
             let material = discrete.materials[subdomain.material];
-            let samples = stress::samples(subdomain, &material, &[], u);
+            let samples = stress::samples(&Region::virgin(subdomain, &material), u);
             stresses.extend(samples.iter().map(|sample| (sample.weight, sample.stress, material)));
         }
         (solved.summary, stresses)

@@ -4,7 +4,7 @@ use faer::prelude::Solve;
 use faer::{Mat, Side};
 
 use super::{Factors, analyse};
-use crate::assembly::stiffness;
+use crate::assembly::{Region, stiffness};
 use crate::constraint::Kind;
 use crate::decomposition::Subdomain;
 use crate::feti::dual::supported;
@@ -51,7 +51,8 @@ fn k_times_its_generalised_inverse_times_k_is_k() {
             for (own, subdomain) in setup.subdomains().iter().enumerate() {
                 for u in [vec![0.0; subdomain.dofs()], stretched(subdomain)] {
                     let mut values = vec![0.0; factors.symbolic(own).pattern.rows.len()];
-                    stiffness::assemble(subdomain, &STEEL, &[], (&u, &[]), &factors.symbolic(own).pattern, &mut values);
+                    let region = Region::virgin(subdomain, &STEEL);
+                    stiffness::assemble(&region, (&u, &[]), &factors.symbolic(own).pattern, &mut values);
                     factors.factorise(own, subdomain, &values, false).expect("stiff up to rigid motions");
                     let times = |factors: &Factors, x: &[f64]| {
                         let mut y = vec![0.0; x.len()];
