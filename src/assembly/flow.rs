@@ -19,6 +19,7 @@ use std::sync::Arc;
 
 use super::Region;
 use super::visit::for_each_point;
+use crate::material::Law;
 use crate::tensor::Voigt;
 
 /// `W` at each integration point of a subdomain, element by element; none at all where it is `N` everywhere.

@@ -3,7 +3,7 @@
 use super::Region;
 use super::visit::{Visited, Visitor, for_each_element, for_each_point};
 use crate::element::{Nodal, Point};
-use crate::material::History;
+use crate::material::{History, Law};
 use crate::tensor::von_mises;
 
 /// What one pass over the elements finds.
@@ -47,14 +47,14 @@ pub struct Answer {
     /// Von Mises stress.
     pub von_mises: f64,
     /// Accumulated plastic strain at the end of the step.
-    pub kappa: f64,
+    pub equivalent_plastic_strain: f64,
     /// Whether it yields at one point at least.
     pub plastic: bool,
 }
 
 /// Adds the internal forces at `u`, one step from the committed history, to `forces`.
 pub fn add_forces(region: &Region, u: &[f64], forces: &mut [f64]) -> Internal {
-    let modulus = region.material.lambda() + 2.0 * region.material.shear_modulus();
+    let modulus = region.material.hooke().lambda() + 2.0 * region.material.hooke().shear_modulus();
     let mut pass = Forces { region, u, forces, modulus, sum: Internal::default() };
     for_each_element(&region.subdomain.elements, &region.subdomain.points, &mut pass);
     pass.sum
@@ -95,7 +95,7 @@ pub fn answers(region: &Region, u: &[f64]) -> Vec<Answer> {
         let response = region.material.respond(&at.strains[0], region.committed(at.index));
         let (share, answer) = (at.weight / at.volume, &mut answers[at.element]);
         answer.von_mises += share * von_mises(&response.stress);
-        answer.kappa += share * response.kappa;
+        answer.equivalent_plastic_strain += share * response.equivalent_plastic_strain;
         answer.plastic |= response.plastic;
     });
     answers
@@ -132,7 +132,7 @@ pub fn elastic_squares<const M: usize>(region: &Region, vectors: [&[f64]; M]) ->
     let mut squares = [0.0; M];
     for_each_point(&region.subdomain.elements, &region.subdomain.points, vectors, |at| {
         for (square, strain) in squares.iter_mut().zip(&at.strains) {
-            *square += at.weight * region.material.elastic_square(strain);
+            *square += at.weight * region.material.hooke().square(strain);
         }
     });
     squares

@@ -11,7 +11,7 @@ pub mod stress;
 pub mod visit;
 
 use crate::decomposition::Subdomain;
-use crate::material::{History, Material};
+use crate::material::{History, Material, Variables};
 
 /// A subdomain with the law of its material and the committed history of its integration points, element by element; no histories
 /// at all mean that nothing ever yielded.

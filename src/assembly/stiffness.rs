@@ -3,6 +3,7 @@
 use super::Region;
 use super::visit::{Visited, Visitor, for_each_element};
 use crate::element::point::block;
+use crate::material::Law;
 use crate::sparse::pattern::Pattern;
 use crate::tensor::{Tangent, Voigt};
 
@@ -10,7 +11,7 @@ use crate::tensor::{Tangent, Voigt};
 /// the directions of [`super::flow`]; without them it is the consistent one. Returns the number of elements that yield.
 pub fn assemble(region: &Region, (u, flow): (&[f64], &[Voigt]), pattern: &Pattern, values: &mut [f64]) -> usize {
     values.fill(0.0);
-    let elastic = region.material.elastic_tangent();
+    let elastic = region.material.hooke().tangent();
     let mut assembly = Assembly { region, u, flow, elastic, pattern, values, plastic: 0 };
     for_each_element(&region.subdomain.elements, &region.subdomain.shape, &mut assembly);
     assembly.plastic

@@ -2,6 +2,7 @@
 
 use super::Region;
 use super::visit::{Visited, Visitor, for_each_element};
+use crate::material::Law;
 use crate::tensor::Voigt;
 
 /// An integration point.

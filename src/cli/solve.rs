@@ -1,5 +1,6 @@
 //! `fetiplast solve`: a scene, coarser levels first where that pays, to files of results.
 
+use crate::material::Law;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -82,7 +83,7 @@ impl Cascade {
     /// The levels to solve before `level`, coarsest first. None where there is a history, of which a coarser
     /// level knows the end, or an earlier state, which is of one mesh.
     fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
-        let linear = scene.contact.is_empty() && scene.material.values().all(|m| m.yield_stress.is_none());
+        let linear = scene.contact.is_empty() && !scene.material.values().any(Law::yields);
         if self == Self::Off || !scene.step.is_empty() || scene.initial.is_some() || (self == Self::Auto && linear) {
             return Vec::new();
         }

@@ -138,7 +138,7 @@ const EDGES: [(usize, usize); 12] =
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::Material;
+    use crate::material::{Law, VonMises};
     use crate::random::Random;
     use crate::tensor::{apply, contract, trace};
 
@@ -193,7 +193,7 @@ mod tests {
     /// Where the dilatation is constant anyway, full integration gives the same; where it is not, more energy.
     #[test]
     fn b_bar_is_full_integration_for_constant_dilatation_and_softer_otherwise() {
-        let c = Material::elastic(1.0, 0.45).elastic_tangent();
+        let c = VonMises::elastic(1.0, 0.45).hooke().tangent();
         let nodes = CORNERS.map(|[x, y, z]| [1.3 * x, 0.7 * y, z]);
         let points = points(&nodes).expect("it has a volume");
         let energy = |u: &Nodal<8>, with: bool| -> f64 {

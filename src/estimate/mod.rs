@@ -33,7 +33,7 @@ use crate::assembly::stress::{self, Sample};
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
-use crate::material::Material;
+use crate::material::{Law, Material};
 use crate::tensor::Voigt;
 
 /// Squares of the discretisation error of own elements, and of their stress.
@@ -84,7 +84,7 @@ pub fn error(regions: &[Region], u: &Torn, exact: impl Fn(usize, [f64; 3]) -> Vo
 
 /// `int sigma_h : C^-1 : sigma_h`.
 fn stress_square(material: &Material, samples: &[Sample]) -> f64 {
-    samples.iter().map(|s| s.weight * material.complementary_square(&s.stress)).sum()
+    samples.iter().map(|s| s.weight * material.hooke().complementary_square(&s.stress)).sum()
 }
 
 /// `int (sigma - sigma_h) : C^-1 : (sigma - sigma_h)` over each element, where `stress` gives sigma from the nodes of an
@@ -98,7 +98,7 @@ fn squares(region: &Region, samples: &[Sample], rule: &[Place], stress: impl Fn(
             for (c, sample) in place.samples.iter().zip(samples) {
                 difference.iter_mut().zip(sample.stress).for_each(|(d, s)| *d -= c * s);
             }
-            volume * region.material.complementary_square(&difference)
+            volume * region.material.hooke().complementary_square(&difference)
         };
         rule.iter().map(at).sum()
     };

@@ -13,7 +13,7 @@ fn errors(whole: &Subdomain, u: Vec<f64>, exact: &dyn Fn([f64; 3]) -> Voigt) -> 
     let clusters = Clusters::singles(&shares);
     let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
     let region = Region::virgin(whole, &orders::MATERIAL);
-    let c = orders::MATERIAL.elastic_tangent();
+    let c = orders::MATERIAL.hooke().tangent();
     let u = vec![u];
     let found = error(&[region], &u, |_, x| apply(&c, &exact(x)));
     let estimated = estimate(&NodeSums::new(&Solo, &alone), &[region], &u);
@@ -86,12 +86,12 @@ fn the_estimate_is_near_the_error_in_a_hollow_sphere() {
 
 /// Pure bending about z (Timoshenko and Goodier 102): stress E x / R along y, linear elements see it constant.
 fn bending(x: [f64; 3]) -> [f64; 3] {
-    let nu = orders::MATERIAL.poisson;
+    let nu = orders::MATERIAL.hooke().poisson;
     [-0.5 * (x[1] * x[1] + nu * (x[0] * x[0] - x[2] * x[2])), x[0] * x[1], -nu * x[0] * x[2]]
 }
 
 fn bending_strain(x: [f64; 3]) -> Voigt {
-    let nu = orders::MATERIAL.poisson;
+    let nu = orders::MATERIAL.hooke().poisson;
     [-nu * x[0], x[0], -nu * x[0], 0.0, 0.0, 0.0]
 }
 

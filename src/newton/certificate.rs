@@ -39,6 +39,7 @@ use crate::assembly::internal;
 use crate::feti::Torn;
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::recover;
+use crate::material::Law;
 use crate::monitor::timing::Timer;
 use crate::vector::dot;
 

@@ -66,5 +66,5 @@ pub fn record(
 /// Von Mises stress and equivalent plastic strain of all elements, one increment from what is committed.
 fn element_states<'a>(problem: &'a TornProblem<'_>, u: &'a Torn) -> impl Iterator<Item = (f64, f64)> + use<'a> {
     let answers = |(own, u): (usize, &Vec<f64>)| internal::answers(&problem.region(own), u);
-    u.iter().enumerate().flat_map(answers).map(|answer| (answer.von_mises, answer.kappa))
+    u.iter().enumerate().flat_map(answers).map(|answer| (answer.von_mises, answer.equivalent_plastic_strain))
 }

@@ -33,7 +33,7 @@ use crate::feti::inverse::kernel;
 use crate::feti::inverse::schur::Schur;
 use crate::feti::preconditioner::Preconditioner;
 use crate::feti::preconditioner::deluxe::Deluxe;
-use crate::material::History;
+use crate::material::{History, Law};
 use crate::model::{self, Discrete, ModelError, bodies};
 use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
@@ -188,11 +188,7 @@ pub fn solve_from(
         coupling: RefCell::new(Coupling::new(constraints)),
         space: &space,
         sums: &sums,
-        yields: discrete
-            .bodies
-            .iter()
-            .flat_map(|b| &b.materials)
-            .any(|&m| discrete.materials[m].yield_stress.is_some()),
+        yields: discrete.bodies.iter().flat_map(|b| &b.materials).any(|&m| discrete.materials[m].yields()),
     };
     timer
         .time("coarse set-up", || model::held::at_all_stages(scene, discrete, &mut coarse, &space, &modes, &stages))?;

@@ -5,11 +5,11 @@ use super::run::Run;
 use super::{Case, Demand, Error, effectivity, material_line, orders};
 use crate::analytic::cylinder::{Cylinder, CylinderState};
 use crate::element::Kind;
-use crate::material::Material;
+use crate::material::VonMises;
 
 /// Of de Souza Neto, Peric and Owen, 7.5, in GPa.
-pub(super) const STEEL: Material =
-    Material { young: 210.0, poisson: 0.3, yield_stress: Some(0.24), hardening: 0.0, kinematic_hardening: 0.0 };
+pub(super) const STEEL: VonMises =
+    VonMises { young: 210.0, poisson: 0.3, yield_stress: Some(0.24), hardening: 0.0, kinematic_hardening: 0.0 };
 
 pub(super) const CYLINDER: Cylinder = Cylinder { inner: 100.0, outer: 200.0, material: STEEL };
 

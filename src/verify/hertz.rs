@@ -4,9 +4,9 @@ use super::run::{Run, pressure_error};
 use super::{Case, Demand, Error, material_line};
 use crate::analytic::hertz::Hertz;
 use crate::element::Kind;
-use crate::material::Material;
+use crate::material::VonMises;
 
-const STEEL: Material = Material::elastic(210_000.0, 0.3);
+const STEEL: VonMises = VonMises::elastic(210_000.0, 0.3);
 const RADIUS: f64 = 100.0;
 /// Makes a circle of contact of radius one.
 const APPROACH: f64 = 0.01;

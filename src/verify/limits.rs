@@ -10,7 +10,7 @@ use super::spheres::symmetry;
 use super::{Case, Demand, End, Error, material_line};
 use crate::analytic::hollow_sphere::HollowSphere;
 use crate::element::Kind;
-use crate::material::Material;
+use crate::material::VonMises;
 
 const SPHERE: HollowSphere = HollowSphere { inner: 100.0, outer: 200.0, material: STEEL };
 
@@ -104,8 +104,8 @@ impl Case for Wall {
 pub struct Footing;
 
 /// Of the ground, in kPa.
-const GROUND: Material =
-    Material { young: 1e7, poisson: 0.48, yield_stress: Some(848.7), hardening: 0.0, kinematic_hardening: 0.0 };
+const GROUND: VonMises =
+    VonMises { young: 1e7, poisson: 0.48, yield_stress: Some(848.7), hardening: 0.0, kinematic_hardening: 0.0 };
 
 /// Half the strip, and how thick a slice of it is.
 const HALF: f64 = 50.0;

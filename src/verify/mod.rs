@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use crate::comm::Comm;
 use crate::element::Kind;
-use crate::material::Material;
+use crate::material::VonMises;
 use crate::scene::{Scene, SceneError};
 use crate::study::StudyError;
 pub use measured::{Demand, Error, Measured, Row, Verdict};
@@ -129,7 +129,7 @@ fn at_level(case: &dyn Case, element: Kind, level: usize, more: &[&str]) -> Resu
 }
 
 /// The paper's steel, in MPa.
-const PAPER: Material = Material {
+const PAPER: VonMises = VonMises {
     young: 210_000.0,
     poisson: 0.29,
     yield_stress: Some(450.0),
@@ -138,8 +138,8 @@ const PAPER: Material = Material {
 };
 
 /// A material as a line of a scene.
-fn material_line(name: &str, material: &Material) -> String {
-    let Material { young, poisson, yield_stress, hardening, .. } = material;
+fn material_line(name: &str, material: &VonMises) -> String {
+    let VonMises { young, poisson, yield_stress, hardening, .. } = material;
     let limit = yield_stress.map_or(String::new(), |limit| format!(", yield_stress = {limit:?}"));
     format!("material.{name} = {{ young = {young:?}, poisson = {poisson:?}{limit}, hardening = {hardening:?} }}")
 }

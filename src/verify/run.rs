@@ -9,6 +9,7 @@ use crate::decomposition::Subdomain;
 use crate::element::Kind;
 use crate::element::sample::{Sample, samples};
 use crate::estimate::{self, Estimate};
+use crate::material::Law;
 use crate::model;
 use crate::model::discrete::Discrete;
 use crate::monitor::table::PhaseTable;
@@ -104,7 +105,7 @@ impl<'a> Run<'a> {
     /// the norms of the closed form. Collective.
     pub fn norms(&self, exact: &dyn Exact) -> [f64; 2] {
         let sums = self.sum(|subdomain, u| {
-            let (body, tangent) = (subdomain.body, self.discrete.materials[subdomain.material].elastic_tangent());
+            let (body, tangent) = (subdomain.body, self.discrete.materials[subdomain.material].hooke().tangent());
             let energy = |strain: &Voigt| contract(&apply(&tangent, strain), strain);
             let mut sums = [0.0; 4];
             each_sample(subdomain, u, |sample, x, u| {

@@ -6,7 +6,8 @@ use super::{Case, Demand, Error, PAPER, effectivity, material_line, orders};
 use crate::analytic::hollow_sphere::{HollowSphere, SphereState, Unloaded};
 use crate::analytic::nested_spheres::NestedSpheres;
 use crate::element::Kind;
-use crate::material::{History, Material};
+use crate::material::von_mises::{PlasticState, VonMises};
+use crate::material::{Law, Variables};
 
 /// The sphere that takes the pressure.
 const SPHERE: HollowSphere = HollowSphere { inner: 100.0, outer: 200.0, material: PAPER };
@@ -130,7 +131,7 @@ fn of_front(run: &Run) -> Demand {
 
 /// Relative error of the radius of a sphere that holds as much yielding volume as was found in the first body.
 fn front(run: &Run, exact: f64) -> f64 {
-    let share = run.share(|body, strain| body == 0 && PAPER.respond(strain, &History::default()).plastic);
+    let share = run.share(|body, strain| body == 0 && PAPER.respond(strain, &PlasticState::VIRGIN).plastic);
     let [a, b] = [SPHERE.inner, SPHERE.outer].map(|r| r.powi(3));
     (a + share * (b - a)).cbrt() / exact - 1.0
 }
@@ -139,7 +140,7 @@ fn front(run: &Run, exact: f64) -> f64 {
 pub struct Nested;
 
 const NESTED: NestedSpheres = NestedSpheres { inner: SPHERE, outer_radius: 300.0, outer_material: ELASTIC, gap: 0.05 };
-const ELASTIC: Material = Material::elastic(PAPER.young, PAPER.poisson);
+const ELASTIC: VonMises = VonMises::elastic(PAPER.young, PAPER.poisson);
 const PRESSURE: f64 = 600.0;
 
 impl Case for Nested {

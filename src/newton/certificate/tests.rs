@@ -1,6 +1,7 @@
 use crate::assembly::{Region, stress};
 use crate::comm::threads;
 use crate::fixture::{not_matching, two_bricks, two_meshes};
+use crate::material::Law;
 use crate::model;
 use crate::monitor::timing::Timer;
 use crate::record::summary::Summary;
@@ -36,7 +37,7 @@ impl Solution {
     fn distance(&self, other: Option<&Self>) -> f64 {
         let square = |(k, (weight, stress, material)): (usize, &(f64, Voigt, crate::material::Material))| {
             let other = other.map_or([0.0; 6], |other| other.stresses[k].1);
-            weight * material.complementary_square(&std::array::from_fn(|i| stress[i] - other[i]))
+            weight * material.hooke().complementary_square(&std::array::from_fn(|i| stress[i] - other[i]))
         };
         self.stresses.iter().enumerate().map(square).sum::<f64>().sqrt()
     }

@@ -26,7 +26,7 @@ use crate::contact::ContactPair;
 use crate::feti::Torn;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::basis::{Bases, Basis};
-use crate::material::History;
+use crate::material::{History, Variable, history};
 use crate::model::discrete::Discrete;
 use crate::newton::committed::{Committed, Sizes};
 use crate::newton::forcing::Forcing;
@@ -204,13 +204,11 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         Field::integer("rows/kept", owned.iter().map(|&row| i64::from(kept[row])).collect()),
         Field::scalar("rows/multiplier", owned.iter().map(|&row| lambda[row]).collect()),
         Field::scalar("rows/last", owned.iter().map(|&row| last_lambda[row]).collect()),
-        Field::of(
-            "histories/plastic_strain",
-            6,
-            Values::Real(histories.iter().flat_map(|history| history.plastic_strain).collect()),
-        ),
-        Field::scalar("histories/kappa", histories.iter().map(|history| history.kappa).collect()),
     ];
+    let variables = history::arrays(histories.into_iter());
+    let of_histories =
+        |of: Variable, values| Field::of(&format!("histories/{}", of.name), of.components, Values::Real(values));
+    arrays.extend(variables.map(|(of, values)| of_histories(of, values)));
     let of_basis = |basis: &Option<Basis>| match basis {
         Some(Basis::At(_, flow)) => Flow::clone(flow),
         _ => Flow::default(),

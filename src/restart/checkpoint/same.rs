@@ -9,7 +9,7 @@ use crate::comm::{Comm, Shares};
 use crate::feti::Torn;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::basis::{Bases, Basis};
-use crate::material::History;
+use crate::material::history;
 use crate::model::discrete::Discrete;
 use crate::restart::places::key;
 use crate::results::checkpoint::Checkpoint;
@@ -97,10 +97,7 @@ pub(super) fn read(
     complete(comm, shares, discrete, &mut of_rows);
     let column = |k: usize| of_rows.iter().map(move |row| f64::from_bits(row[k])).collect::<Vec<f64>>();
 
-    let strains = histories.read::<f64>(file, "histories/plastic_strain", 0)?;
-    let kappas = histories.read::<f64>(file, "histories/kappa", 0)?;
-    let strains = strains.as_chunks::<6>().0.iter();
-    let remembered = strains.zip(kappas).map(|(&plastic_strain, kappa)| History { plastic_strain, kappa }).collect();
+    let remembered = history::from_arrays(|name| histories.read::<f64>(file, &format!("histories/{name}"), 0))?;
     let [of_points, of_cells] = recorded;
     Ok(Arrays {
         u: torn("points/displacement")?,
