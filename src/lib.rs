@@ -34,6 +34,8 @@ pub mod vector;
 pub mod verify;
 
 #[cfg(test)]
+mod extension;
+#[cfg(test)]
 mod fixture;
 #[cfg(test)]
 mod random;

@@ -34,7 +34,8 @@ impl Verify {
 
 fn element(text: &str) -> Result<Kind, String> {
     let found = verify::ELEMENTS.into_iter().find(|element| element.name() == text);
-    found.ok_or_else(|| "it is tet4, hex8 or tet10".into())
+    let [others @ .., last] = verify::ELEMENTS.map(Kind::name);
+    found.ok_or_else(|| format!("it is {} or {last}", others.join(", ")))
 }
 
 /// Runs cases and says what became of them: exit code 0 if all demands are met. Collective.

@@ -107,10 +107,7 @@ impl Case for Smooth {
     }
 
     fn levels(&self, element: Kind) -> Vec<usize> {
-        match element {
-            Kind::Tet10 => vec![2, 4, 8],
-            Kind::Tet4 | Kind::Hex8 => vec![4, 8, 16],
-        }
+        if element.degree() == 1 { vec![4, 8, 16] } else { vec![2, 4, 8] }
     }
 
     fn force(&self) -> Option<fn([f64; 3]) -> [f64; 3]> {

@@ -147,11 +147,11 @@ fn material_line(name: &str, material: &VonMises) -> String {
 /// Orders in energy and displacement. A plastic front, where second derivatives jump, costs up to half an order; linear
 /// elements feel it in the displacement only.
 fn orders(element: Kind, has_front: bool) -> [Demand; 2] {
-    match (element, has_front) {
-        (Kind::Tet10, false) => [2.0, 3.0],
-        (Kind::Tet10, true) => [1.5, 2.5],
-        (Kind::Tet4 | Kind::Hex8, false) => [1.0, 2.0],
-        (Kind::Tet4 | Kind::Hex8, true) => [1.0, 1.5],
+    match (element.degree(), has_front) {
+        (1, false) => [1.0, 2.0],
+        (1, true) => [1.0, 1.5],
+        (_, false) => [2.0, 3.0],
+        (_, true) => [1.5, 2.5],
     }
     .map(Demand::Order)
 }

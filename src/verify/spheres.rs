@@ -46,10 +46,7 @@ pub(super) fn symmetry(body: &str) -> String {
 }
 
 fn levels(element: Kind) -> Vec<usize> {
-    match element {
-        Kind::Tet10 => vec![2, 4, 8],
-        Kind::Tet4 | Kind::Hex8 => vec![4, 8, 16],
-    }
+    if element.degree() == 1 { vec![4, 8, 16] } else { vec![2, 4, 8] }
 }
 
 impl Case for Hollow {
