@@ -9,8 +9,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use fetiplast::comm::solo::Solo;
 use fetiplast::kernels::{
-    Analysis, Coarse, Factor, Factors, Gather, Lower, Precision, RigidModes, Schur, Subdomain, Workspace, analyse,
-    stiffness,
+    Analysis, Coarse, Factor, Factors, Gather, Lower, Precision, Region, RigidModes, Schur, Subdomain, Workspace,
+    analyse, stiffness,
 };
 use fetiplast::model::{self, Discrete};
 use fetiplast::scene::Scene;
@@ -74,8 +74,9 @@ fn subdomain(cells: usize) {
     let pattern = &symbolic[0].pattern;
     let mut values = vec![0.0; pattern.rows.len()];
     let rest = vec![0.0; pattern.dofs()];
+    let region = Region::virgin(&subdomains[0], &materials[0]);
     let assembly = best(200, || {
-        stiffness::assemble(&subdomains[0], &materials[0], &[], (&rest, &[]), pattern, &mut values);
+        stiffness::assemble(&region, (&rest, &[]), pattern, &mut values);
     });
     for precision in [Precision::Single, Precision::Double] {
         let mut factors = Factors::new(symbolic.clone(), precision);

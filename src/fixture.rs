@@ -2,7 +2,7 @@
 
 use faer::Mat;
 
-use crate::assembly::stiffness;
+use crate::assembly::{Region, stiffness};
 use crate::comm::{Comm, threads};
 use crate::constraint::Row;
 use crate::decomposition::Subdomain;
@@ -271,7 +271,8 @@ impl<'a> Setup<'a> {
 /// The lower values of a subdomain's elastic stiffness.
 pub fn elastic(subdomain: &Subdomain, material: &Material, pattern: &Pattern) -> Vec<f64> {
     let mut values = vec![0.0; pattern.rows.len()];
-    stiffness::assemble(subdomain, material, &[], (&vec![0.0; subdomain.dofs()], &[]), pattern, &mut values);
+    let rest = vec![0.0; subdomain.dofs()];
+    stiffness::assemble(&Region::virgin(subdomain, material), (&rest, &[]), pattern, &mut values);
     values
 }
 

@@ -93,6 +93,8 @@ mod vector;
 mod verify;
 
 #[cfg(test)]
+mod extension;
+#[cfg(test)]
 mod fixture;
 #[cfg(test)]
 mod random;
@@ -100,7 +102,7 @@ mod random;
 /// What `benches/kernels.rs` measures; no part of the interface.
 #[doc(hidden)]
 pub mod kernels {
-    pub use crate::assembly::stiffness;
+    pub use crate::assembly::{Region, stiffness};
     pub use crate::decomposition::Subdomain;
     pub use crate::feti::coarse::Coarse;
     pub use crate::feti::dual::gather::Gather;

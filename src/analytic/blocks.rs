@@ -3,12 +3,12 @@
 //! Frictionless blocks with symmetry supports stay in uniaxial compression; with the strain d = (U - g) / (2 L) of both
 //! the pressure is E d, or (H d + sigma_y) / (1 + H / E) beyond yield. Matching meshes meet it to solver tolerance.
 
-use crate::material::Material;
+use crate::material::VonMises;
 
 /// Two blocks of one material and one height with a gap between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoBlocks {
-    pub material: Material,
+    pub material: VonMises,
     /// Height L > 0 of each block.
     pub height: f64,
     /// Initial gap g >= 0.
@@ -30,7 +30,7 @@ impl TwoBlocks {
     /// Pushes the top of the upper block down by `displacement`.
     pub fn pressed(&self, displacement: f64) -> Pressed {
         let strain = (displacement - self.gap).max(0.0) / (2.0 * self.height);
-        let Material { young, hardening, .. } = self.material;
+        let VonMises { young, hardening, .. } = self.material;
         let elastic = young * strain;
         let pressure = match self.material.yield_stress {
             Some(limit) if elastic > limit => (hardening * strain + limit) / (1.0 + hardening / young),

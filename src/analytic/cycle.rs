@@ -4,7 +4,7 @@
 //! von Mises material with linear hardening are those of one bar: |s - C p| <= sigma_y + H kappa, kappa grows with |p|.
 //! Along a monotone part of the path they integrate to a straight line.
 
-use crate::material::Material;
+use crate::material::{Law, VonMises};
 
 /// A bar of von Mises material at some point of its path.
 ///
@@ -12,7 +12,7 @@ use crate::material::Material;
 /// shear over sqrt(3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cycle {
-    material: Material,
+    material: VonMises,
     /// Signed equivalent stress.
     pub stress: f64,
     /// Signed equivalent plastic strain.
@@ -23,13 +23,13 @@ pub struct Cycle {
 
 impl Cycle {
     /// The virgin state.
-    pub fn new(material: Material) -> Self {
+    pub fn new(material: VonMises) -> Self {
         Self { material, stress: 0.0, plastic: 0.0, kappa: 0.0 }
     }
 
     /// Goes on to another stress. Beyond yield H + C > 0 is needed: with perfect plasticity no such stress exists.
     pub fn load(&mut self, stress: f64) {
-        let Material { yield_stress, hardening, kinematic_hardening, .. } = self.material;
+        let VonMises { yield_stress, hardening, kinematic_hardening, .. } = self.material;
         self.stress = stress;
         let Some(initial) = yield_stress else { return };
         let relative = stress - kinematic_hardening * self.plastic;
@@ -43,7 +43,7 @@ impl Cycle {
 
     /// Goes on to another strain along the same uniaxial stress.
     pub fn stretch(&mut self, strain: f64) {
-        let Material { young, yield_stress, hardening, kinematic_hardening, .. } = self.material;
+        let VonMises { young, yield_stress, hardening, kinematic_hardening, .. } = self.material;
         let trial = young * (strain - self.plastic);
         let relative = trial - kinematic_hardening * self.plastic;
         let excess = yield_stress.map_or(0.0, |initial| relative.abs() - (initial + hardening * self.kappa));
@@ -62,7 +62,7 @@ impl Cycle {
     /// Total engineering shear, where the shear stress is the equivalent stress over sqrt(3).
     pub fn shear(&self) -> f64 {
         let root = 3f64.sqrt();
-        self.stress / root / self.material.shear_modulus() + root * self.plastic
+        self.stress / root / self.material.hooke().shear_modulus() + root * self.plastic
     }
 }
 
@@ -94,7 +94,7 @@ mod tests {
     /// isotropically, at -400 if kinematically.
     #[test]
     fn reversed_yield_tells_the_hardenings_apart() {
-        let kinematic = Material { hardening: 0.0, kinematic_hardening: 10000.0, ..STEEL };
+        let kinematic = VonMises { hardening: 0.0, kinematic_hardening: 10000.0, ..STEEL };
         for (material, limit) in [(STEEL, -500.0), (kinematic, -400.0)] {
             let mut bar = Cycle::new(material);
             for (stress, plastic, kappa) in
@@ -110,7 +110,7 @@ mod tests {
     /// Driven by the strain of each state, or by its stress in any number of parts, the bar takes the same path.
     #[test]
     fn strain_and_stress_drive_alike() {
-        let material = Material { hardening: 4000.0, kinematic_hardening: 7000.0, ..STEEL };
+        let material = VonMises { hardening: 4000.0, kinematic_hardening: 7000.0, ..STEEL };
         let [mut by_stress, mut by_strain, mut in_parts] = [Cycle::new(material); 3];
         for stress in [480.0, 700.0, -300.0, -800.0, 0.0] {
             let from = in_parts.stress;

@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use crate::material::Material;
+use crate::material::VonMises;
 
 /// The contact of a ball under a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Hertz {
 
 impl Hertz {
     /// Of a ball of radius `ball` that is pressed on by `force`.
-    pub fn new(material: &Material, ball: f64, force: f64) -> Self {
+    pub fn new(material: &VonMises, ball: f64, force: f64) -> Self {
         let modulus = material.young / (1.0 - material.poisson * material.poisson);
         let radius = (0.75 * force * ball / modulus).cbrt();
         Self { radius, peak: 1.5 * force / (PI * radius * radius), approach: radius * radius / ball }
@@ -40,7 +40,7 @@ mod tests {
     /// The pressure adds up to the force, and by Boussinesq's solution it presses the middle down by the approach.
     #[test]
     fn the_pressure_carries_the_force_and_makes_the_approach() {
-        let material = Material::elastic(210_000.0, 0.3);
+        let material = VonMises::elastic(210_000.0, 0.3);
         let (ball, force) = (100.0, 1500.0);
         let state = Hertz::new(&material, ball, force);
         // Over r = a sin t, where the integrands are smooth.

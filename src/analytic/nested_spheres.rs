@@ -5,7 +5,7 @@
 
 use super::bisect;
 use super::hollow_sphere::{HollowSphere, SphereState};
-use crate::material::Material;
+use crate::material::VonMises;
 
 /// Geometry and materials.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct NestedSpheres {
     /// Outer radius of the enclosing sphere.
     pub outer_radius: f64,
     /// Material of the enclosing sphere.
-    pub outer_material: Material,
+    pub outer_material: VonMises,
     /// Initial radial gap, >= 0.
     pub gap: f64,
 }
@@ -57,7 +57,7 @@ mod tests {
 
     fn spheres(gap: f64) -> NestedSpheres {
         let inner = HollowSphere { inner: 100.0, outer: 200.0, material: STEEL };
-        let outer_material = Material::elastic(STEEL.young, STEEL.poisson);
+        let outer_material = VonMises::elastic(STEEL.young, STEEL.poisson);
         NestedSpheres { inner, outer_radius: 300.0, outer_material, gap }
     }
 

@@ -17,44 +17,21 @@
 
 use std::sync::Arc;
 
-use super::{committed, displacements, integrated};
-use crate::decomposition::Subdomain;
-use crate::element::{Nodal, Point, by_kind};
-use crate::material::{History, Material};
+use super::Region;
+use super::visit::for_each_point;
+use crate::material::Law;
 use crate::tensor::Voigt;
 
 /// `W` at each integration point of a subdomain, element by element; none at all where it is `N` everywhere.
 pub type Flow = Arc<Vec<Voigt>>;
 
 /// The directions after a step of this `length` from the displacement `u`, which changed by `change`, with `flow` before it.
-pub fn follow(
-    subdomain: &Subdomain,
-    material: &Material,
-    history: &[History],
-    flow: &[Voigt],
-    u: &[f64],
-    step: (&[f64], f64),
-) -> Vec<Voigt> {
-    by_kind!(subdomain.elements.kind(), follow_of(subdomain, material, history, flow, u, step))
-}
-
-fn follow_of<const N: usize, const P: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    subdomain: &Subdomain,
-    material: &Material,
-    history: &[History],
-    flow: &[Voigt],
-    u: &[f64],
-    (change, length): (&[f64], f64),
-) -> Vec<Voigt> {
-    let mut next = Vec::with_capacity(P * subdomain.elements.len());
-    for (index, (nodes, points)) in integrated(points, &subdomain.elements, &subdomain.shape).enumerate() {
-        let (u, change) = (displacements(u, nodes), displacements(change, nodes));
-        for (k, point) in points.iter().enumerate() {
-            let at = P * index + k;
-            let step = (&point.strain(&change), length);
-            next.push(material.flow(&point.strain(&u), committed(history, at), flow.get(at), step));
-        }
-    }
+pub fn follow(region: &Region, flow: &[Voigt], u: &[f64], (change, length): (&[f64], f64)) -> Vec<Voigt> {
+    let elements = &region.subdomain.elements;
+    let mut next = Vec::with_capacity(elements.kind().points() * elements.len());
+    for_each_point(elements, &region.subdomain.shape, [u, change], |at| {
+        let ([strain, change], committed) = (&at.strains, region.committed(at.index));
+        next.push(region.material.flow(strain, committed, flow.get(at.index), (change, length)));
+    });
     next
 }

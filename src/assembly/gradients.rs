@@ -1,26 +1,25 @@
 //! Gradients of the displacement at the integration points.
 
-use super::{displacements, integrated};
+use super::visit::{Visited, Visitor, for_each_element};
 use crate::decomposition::Subdomain;
-use crate::element::{Nodal, Point, by_kind};
 
 /// Hands each element's number and the gradient at each of its points, `[i][j]` the derivative of component `i` by
 /// coordinate `j`.
 pub fn each(subdomain: &Subdomain, u: &[f64], hand: impl FnMut(usize, [[f64; 3]; 3])) {
-    by_kind!(subdomain.elements.kind(), each_of(subdomain, u, hand));
+    for_each_element(&subdomain.elements, &subdomain.points, &mut Gradients { u, hand });
 }
 
-fn each_of<const N: usize, const P: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    subdomain: &Subdomain,
-    u: &[f64],
-    mut hand: impl FnMut(usize, [[f64; 3]; 3]),
-) {
-    for (index, (nodes, points)) in integrated(points, &subdomain.elements, &subdomain.points).enumerate() {
-        let u = displacements(u, nodes);
-        for point in &points {
+struct Gradients<'a, F> {
+    u: &'a [f64],
+    hand: F,
+}
+
+impl<F: FnMut(usize, [[f64; 3]; 3])> Visitor for Gradients<'_, F> {
+    fn see<const N: usize, const P: usize>(&mut self, element: &Visited<N, P>) {
+        let u = element.nodal(self.u);
+        for point in &element.points {
             let slope = |i: usize, j: usize| point.gradients.iter().zip(&u).map(|(g, u)| u[i] * g[j]).sum();
-            hand(index, std::array::from_fn(|i| std::array::from_fn(|j| slope(i, j))));
+            (self.hand)(element.index, std::array::from_fn(|i| std::array::from_fn(|j| slope(i, j))));
         }
     }
 }

@@ -1,11 +1,9 @@
 //! `F(u) = D Psi(u)`: internal forces and energy of a subdomain, and energies in the elastic norm.
-//!
-//! Histories are those of the integration points, element by element.
 
-use super::{committed, displacements, integrated};
-use crate::decomposition::Subdomain;
-use crate::element::{Nodal, Point, by_kind};
-use crate::material::{History, Material};
+use super::Region;
+use super::visit::{Visited, Visitor, for_each_element, for_each_point};
+use crate::element::{Nodal, Point};
+use crate::material::{History, Law};
 use crate::tensor::von_mises;
 
 /// What one pass over the elements finds.
@@ -49,157 +47,93 @@ pub struct Answer {
     /// Von Mises stress.
     pub von_mises: f64,
     /// Accumulated plastic strain at the end of the step.
-    pub kappa: f64,
+    pub equivalent_plastic_strain: f64,
     /// Whether it yields at one point at least.
     pub plastic: bool,
 }
 
-/// Adds the internal forces at `u`, one step from the committed `history`, to `forces`.
-pub fn add_forces(
-    subdomain: &Subdomain,
-    material: &Material,
-    history: &[History],
-    u: &[f64],
-    forces: &mut [f64],
-) -> Internal {
-    by_kind!(subdomain.elements.kind(), add_forces_of(subdomain, material, history, u, forces))
+/// Adds the internal forces at `u`, one step from the committed history, to `forces`.
+pub fn add_forces(region: &Region, u: &[f64], forces: &mut [f64]) -> Internal {
+    let modulus = region.material.hooke().lambda() + 2.0 * region.material.hooke().shear_modulus();
+    let mut pass = Forces { region, u, forces, modulus, sum: Internal::default() };
+    for_each_element(&region.subdomain.elements, &region.subdomain.points, &mut pass);
+    pass.sum
 }
 
-fn add_forces_of<const N: usize, const P: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    subdomain: &Subdomain,
-    material: &Material,
-    history: &[History],
-    u: &[f64],
-    forces: &mut [f64],
-) -> Internal {
-    let modulus = material.lambda() + 2.0 * material.shear_modulus();
-    let mut sum = Internal::default();
-    for (index, (nodes, points)) in integrated(points, &subdomain.elements, &subdomain.points).enumerate() {
-        let u = displacements(u, nodes);
-        sum.terms.add(&points, modulus, &u);
+struct Forces<'a> {
+    region: &'a Region<'a>,
+    u: &'a [f64],
+    forces: &'a mut [f64],
+    /// `lambda + 2 mu`.
+    modulus: f64,
+    sum: Internal,
+}
+
+impl Visitor for Forces<'_> {
+    fn see<const N: usize, const P: usize>(&mut self, element: &Visited<N, P>) {
+        let u = element.nodal(self.u);
+        self.sum.terms.add(&element.points, self.modulus, &u);
         let mut plastic = false;
         let mut local = [[0.0; 3]; N];
-        for (k, point) in points.iter().enumerate() {
-            let response = material.respond(&point.strain(&u), committed(history, P * index + k));
-            sum.energy += point.weight * response.energy;
+        for (index, point) in element.points() {
+            let response = self.region.material.respond(&point.strain(&u), self.region.committed(index));
+            self.sum.energy += point.weight * response.energy;
             plastic |= response.plastic;
             point.add_internal(&response.stress, &mut local);
         }
-        sum.plastic += usize::from(plastic);
-        for (&node, force) in nodes.iter().zip(&local) {
-            (0..3).for_each(|i| forces[3 * node as usize + i] += force[i]);
+        self.sum.plastic += usize::from(plastic);
+        for (&node, force) in element.nodes.iter().zip(&local) {
+            (0..3).for_each(|i| self.forces[3 * node as usize + i] += force[i]);
         }
     }
-    sum
 }
 
-/// What the elements answer to `u`, one step from the committed `history`.
-pub fn answers(subdomain: &Subdomain, material: &Material, history: &[History], u: &[f64]) -> Vec<Answer> {
-    by_kind!(subdomain.elements.kind(), answers_of(subdomain, material, history, u))
-}
-
-fn answers_of<const N: usize, const P: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    subdomain: &Subdomain,
-    material: &Material,
-    history: &[History],
-    u: &[f64],
-) -> Vec<Answer> {
-    let elements = integrated(points, &subdomain.elements, &subdomain.points).enumerate();
-    elements
-        .map(|(index, (nodes, points))| {
-            let u = displacements(u, nodes);
-            let volume: f64 = points.iter().map(|point| point.weight).sum();
-            let mut answer = Answer::default();
-            for (k, point) in points.iter().enumerate() {
-                let response = material.respond(&point.strain(&u), committed(history, P * index + k));
-                let share = point.weight / volume;
-                answer.von_mises += share * von_mises(&response.stress);
-                answer.kappa += share * response.kappa;
-                answer.plastic |= response.plastic;
-            }
-            answer
-        })
-        .collect()
+/// What the elements answer to `u`, one step from the committed history.
+pub fn answers(region: &Region, u: &[f64]) -> Vec<Answer> {
+    let mut answers = vec![Answer::default(); region.subdomain.elements.len()];
+    for_each_point(&region.subdomain.elements, &region.subdomain.points, [u], |at| {
+        let response = region.material.respond(&at.strains[0], region.committed(at.index));
+        let (share, answer) = (at.weight / at.volume, &mut answers[at.element]);
+        answer.von_mises += share * von_mises(&response.stress);
+        answer.equivalent_plastic_strain += share * response.equivalent_plastic_strain;
+        answer.plastic |= response.plastic;
+    });
+    answers
 }
 
 /// `Psi(u + change) - Psi(u) - F(u)'change >= 0` (energy), without cancellation.
-pub fn divergence(subdomain: &Subdomain, material: &Material, history: &[History], u: &[f64], change: &[f64]) -> f64 {
-    by_kind!(subdomain.elements.kind(), divergence_of(subdomain, material, history, u, change))
-}
-
-fn divergence_of<const N: usize, const P: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    subdomain: &Subdomain,
-    material: &Material,
-    history: &[History],
-    u: &[f64],
-    change: &[f64],
-) -> f64 {
+pub fn divergence(region: &Region, u: &[f64], change: &[f64]) -> f64 {
     let mut sum = 0.0;
-    for (index, (nodes, points)) in integrated(points, &subdomain.elements, &subdomain.points).enumerate() {
-        let (u, change) = (displacements(u, nodes), displacements(change, nodes));
-        for (k, point) in points.iter().enumerate() {
-            let history = committed(history, P * index + k);
-            sum += point.weight * material.divergence(&point.strain(&u), &point.strain(&change), history);
-        }
-    }
+    for_each_point(&region.subdomain.elements, &region.subdomain.points, [u, change], |at| {
+        let [strain, change] = &at.strains;
+        sum += at.weight * region.material.divergence(strain, change, region.committed(at.index));
+    });
     sum
 }
 
-/// Commits the step that ends at `u`.
-pub fn commit(subdomain: &Subdomain, material: &Material, u: &[f64], history: &mut Vec<History>) {
-    by_kind!(subdomain.elements.kind(), commit_of(subdomain, material, u, history))
+/// The histories after the step that ends at `u`.
+pub fn commit(region: &Region, u: &[f64]) -> Vec<History> {
+    let elements = &region.subdomain.elements;
+    let mut histories = Vec::with_capacity(elements.kind().points() * elements.len());
+    for_each_point(elements, &region.subdomain.points, [u], |at| {
+        histories.push(region.material.commit(&at.strains[0], region.committed(at.index)));
+    });
+    histories
 }
 
-fn commit_of<const N: usize, const P: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    subdomain: &Subdomain,
-    material: &Material,
-    u: &[f64],
-    history: &mut Vec<History>,
-) {
-    history.resize(P * subdomain.elements.len(), History::default());
-    let elements = integrated(points, &subdomain.elements, &subdomain.points);
-    for ((nodes, points), history) in elements.zip(history.as_chunks_mut::<P>().0) {
-        let u = displacements(u, nodes);
-        for (point, history) in points.iter().zip(history) {
-            *history = material.commit(&point.strain(&u), history);
-        }
-    }
-}
-
-/// The elements that yield at `u`, one step from the committed `history`, by their nodes.
-pub fn yielding<'a>(
-    subdomain: &'a Subdomain,
-    material: &Material,
-    history: &[History],
-    u: &[f64],
-) -> impl Iterator<Item = &'a [u32]> + use<'a> {
-    let answers = answers(subdomain, material, history, u);
-    subdomain.elements.iter().zip(answers).filter(|(_, answer)| answer.plastic).map(|(nodes, _)| nodes)
+/// The elements that yield at `u`, one step from the committed history, by their nodes.
+pub fn yielding<'a>(region: &Region<'a>, u: &[f64]) -> impl Iterator<Item = &'a [u32]> + use<'a> {
+    let answers = answers(region, u);
+    region.subdomain.elements.iter().zip(answers).filter(|(_, answer)| answer.plastic).map(|(nodes, _)| nodes)
 }
 
 /// `v'K_e v` of each vector (energy).
-pub fn elastic_squares<const M: usize>(subdomain: &Subdomain, material: &Material, vectors: [&[f64]; M]) -> [f64; M] {
-    by_kind!(subdomain.elements.kind(), elastic_squares_of(subdomain, material, vectors))
-}
-
-fn elastic_squares_of<const N: usize, const P: usize, const M: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    subdomain: &Subdomain,
-    material: &Material,
-    vectors: [&[f64]; M],
-) -> [f64; M] {
+pub fn elastic_squares<const M: usize>(region: &Region, vectors: [&[f64]; M]) -> [f64; M] {
     let mut squares = [0.0; M];
-    for (nodes, points) in integrated(points, &subdomain.elements, &subdomain.points) {
-        for (square, v) in squares.iter_mut().zip(vectors) {
-            let v = displacements(v, nodes);
-            for point in &points {
-                *square += point.weight * material.elastic_square(&point.strain(&v));
-            }
+    for_each_point(&region.subdomain.elements, &region.subdomain.points, vectors, |at| {
+        for (square, strain) in squares.iter_mut().zip(&at.strains) {
+            *square += at.weight * region.material.hooke().square(strain);
         }
-    }
+    });
     squares
 }

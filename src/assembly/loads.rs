@@ -1,8 +1,8 @@
 //! `f`: consistent nodal forces of dead loads, shared out by the shape functions of each face and element.
 
-use super::integrated;
+use super::visit::{Visited, Visitor, for_each_element};
 use crate::decomposition::Subdomain;
-use crate::element::{Kind, Nodal, Point, hex8, sample, tet4, tet10};
+use crate::element::sample;
 use crate::mesh::surface;
 
 /// A load on a named surface or in a body.
@@ -75,12 +75,8 @@ pub fn add(subdomain: &Subdomain, loads: &[Load], forces: &mut [f64]) {
     for load in loads {
         match load {
             Load::BodyForce { body, value } if *body == subdomain.body => {
-                let mut give = |node: u32, volume: f64| give(node, value.map(|v| volume * v));
-                match subdomain.elements.kind() {
-                    Kind::Tet4 => share_volumes(tet4::points, &tet4::VALUES, subdomain, &mut give),
-                    Kind::Tet10 => share_volumes(tet10::points, &tet10::values_at_points(), subdomain, &mut give),
-                    Kind::Hex8 => share_volumes(hex8::points, &hex8::values_at_points(), subdomain, &mut give),
-                }
+                let give = |node: u32, volume: f64| give(node, value.map(|v| volume * v));
+                for_each_element(&subdomain.elements, &subdomain.shape, &mut Volumes(give));
             }
             Load::Field { body, value, factor } if *body == subdomain.body => {
                 share_field(subdomain, |place| value(place).map(|v| factor * v), &mut give);
@@ -101,16 +97,13 @@ fn share_field(subdomain: &Subdomain, field: impl Fn([f64; 3]) -> [f64; 3], give
     }
 }
 
-/// Tells the integral over each element of its nodes' shape functions, which have these values at its points.
-fn share_volumes<const N: usize, const P: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    values: &[[f64; N]; P],
-    subdomain: &Subdomain,
-    give: &mut impl FnMut(u32, f64),
-) {
-    for (nodes, points) in integrated(points, &subdomain.elements, &subdomain.shape) {
-        for (point, values) in points.iter().zip(values) {
-            nodes.iter().zip(values).for_each(|(&node, value)| give(node, point.weight * value));
+/// Tells the integral over each element of its nodes' shape functions.
+struct Volumes<F>(F);
+
+impl<F: FnMut(u32, f64)> Visitor for Volumes<F> {
+    fn see<const N: usize, const P: usize>(&mut self, element: &Visited<N, P>) {
+        for (point, values) in element.points.iter().zip(element.values) {
+            element.nodes.iter().zip(values).for_each(|(&node, value)| (self.0)(node, point.weight * value));
         }
     }
 }

@@ -1,9 +1,8 @@
 //! Stresses at the integration points, with their places.
 
-use super::{committed, displacements, integrated};
-use crate::decomposition::Subdomain;
-use crate::element::{Kind, Nodal, Point, hex8, tet4, tet10};
-use crate::material::{History, Material};
+use super::Region;
+use super::visit::{Visited, Visitor, for_each_element};
+use crate::material::Law;
 use crate::tensor::Voigt;
 
 /// An integration point.
@@ -17,32 +16,31 @@ pub struct Sample {
     pub stress: Voigt,
 }
 
-/// The stresses at `u`, one step from the committed `history`, element by element.
-pub fn samples(subdomain: &Subdomain, material: &Material, history: &[History], u: &[f64]) -> Vec<Sample> {
-    match subdomain.elements.kind() {
-        Kind::Tet4 => samples_of(tet4::points, &tet4::VALUES, subdomain, material, history, u),
-        Kind::Tet10 => samples_of(tet10::points, &tet10::values_at_points(), subdomain, material, history, u),
-        Kind::Hex8 => samples_of(hex8::points, &hex8::values_at_points(), subdomain, material, history, u),
-    }
+/// The stresses at `u`, one step from the committed history, element by element.
+pub fn samples(region: &Region, u: &[f64]) -> Vec<Sample> {
+    let elements = &region.subdomain.elements;
+    let samples = Vec::with_capacity(elements.kind().points() * elements.len());
+    let mut stresses = Stresses { region, u, samples };
+    for_each_element(elements, &region.subdomain.points, &mut stresses);
+    stresses.samples
 }
 
-fn samples_of<const N: usize, const P: usize>(
-    points: impl Fn(&Nodal<N>) -> Option<[Point<N>; P]>,
-    values: &[[f64; N]; P],
-    subdomain: &Subdomain,
-    material: &Material,
-    history: &[History],
-    u: &[f64],
-) -> Vec<Sample> {
-    let mut samples = Vec::with_capacity(P * subdomain.elements.len());
-    for (nodes, points) in integrated(points, &subdomain.elements, &subdomain.points) {
-        let u = displacements(u, nodes);
-        for (point, values) in points.iter().zip(values) {
-            let response = material.respond(&point.strain(&u), committed(history, samples.len()));
-            let along = |i: usize| nodes.iter().zip(values).map(|(&n, v)| v * subdomain.points[n as usize][i]).sum();
+struct Stresses<'a> {
+    region: &'a Region<'a>,
+    u: &'a [f64],
+    samples: Vec<Sample>,
+}
+
+impl Visitor for Stresses<'_> {
+    fn see<const N: usize, const P: usize>(&mut self, element: &Visited<N, P>) {
+        let Region { subdomain, material, .. } = self.region;
+        let u = element.nodal(self.u);
+        for ((index, point), values) in element.points().zip(element.values) {
+            let response = material.respond(&point.strain(&u), self.region.committed(index));
+            let of_nodes = || element.nodes.iter().zip(values);
+            let along = |i: usize| of_nodes().map(|(&n, v)| v * subdomain.points[n as usize][i]).sum();
             let place = std::array::from_fn(along);
-            samples.push(Sample { place, weight: point.weight, stress: response.stress });
+            self.samples.push(Sample { place, weight: point.weight, stress: response.stress });
         }
     }
-    samples
 }

@@ -1,11 +1,11 @@
-use super::{internal, loads, stiffness};
+use super::{Region, internal, loads, stiffness};
 use crate::decomposition::Subdomain;
 use crate::fixture::{
     assert_close, block_diagonal, built_in, column, dense, elastic, on_ranks, same_on_any_ranks, two_bricks,
     two_bricks_by_metis,
 };
-use crate::material::samples::STEEL;
-use crate::material::{History, Material};
+use crate::material::samples::{MATERIAL, STEEL};
+use crate::material::{History, Hooke, Law, Material, VonMises};
 use crate::random::Random;
 use crate::scene::Scene;
 use crate::sparse::pattern::Pattern;
@@ -45,7 +45,7 @@ fn a_linear_displacement_leaves_no_force_inside_whether_elastic_or_plastic() {
                 for subdomain in setup.subdomains() {
                     let u = linear_field(subdomain, strain);
                     let mut forces = vec![0.0; u.len()];
-                    let found = internal::add_forces(subdomain, &STEEL, &[], &u, &mut forces);
+                    let found = internal::add_forces(&Region::virgin(subdomain, &MATERIAL), &u, &mut forces);
                     assert_eq!(found.plastic, if strain > 1e-2 { subdomain.elements.len() } else { 0 });
                     let tolerance = 1e-12 * size(&forces);
                     for (node, force) in forces.chunks_exact(3).enumerate() {
@@ -69,7 +69,7 @@ fn a_translation_has_terms_that_cancel() {
             for subdomain in setup.subdomains() {
                 let u = [1.0, -2.0, 3.0].repeat(subdomain.nodes.len());
                 let mut forces = vec![0.0; u.len()];
-                let found = internal::add_forces(subdomain, &STEEL, &[], &u, &mut forces);
+                let found = internal::add_forces(&Region::virgin(subdomain, &MATERIAL), &u, &mut forces);
                 let force_squares: f64 = forces.iter().map(|f| f * f).sum();
                 assert!(found.energy <= 1e-30 * found.terms.energy);
                 assert!(force_squares <= 1e-30 * found.terms.force_squares);
@@ -83,9 +83,10 @@ fn a_translation_has_terms_that_cancel() {
 fn terms_are_no_less_than_what_is_left_of_them() {
     for scene in shapes() {
         on_ranks(&scene, 1, |setup| {
+            let elastic = Material::from(VonMises::elastic(210.0, 0.29));
             for (subdomain, u) in setup.subdomains().iter().zip(setup.displacements(4)) {
                 let mut forces = vec![0.0; u.len()];
-                let found = internal::add_forces(subdomain, &Material::elastic(210.0, 0.29), &[], &u, &mut forces);
+                let found = internal::add_forces(&Region::virgin(subdomain, &elastic), &u, &mut forces);
                 assert!(found.terms.energy >= found.energy && found.energy > 0.0);
                 // Random displacements do not cancel.
                 assert!(found.terms.energy <= 100.0 * found.energy);
@@ -98,17 +99,17 @@ fn terms_are_no_less_than_what_is_left_of_them() {
 fn elastic_forces_energy_and_norm_are_those_of_the_stiffness() {
     for scene in shapes() {
         on_ranks(&scene, 1, |setup| {
-            let material = Material::elastic(210.0, 0.29);
+            let material = Material::from(VonMises::elastic(210.0, 0.29));
             for (subdomain, u) in setup.subdomains().iter().zip(setup.displacements(4)) {
                 let pattern = pattern_of(subdomain);
                 let k = dense(&pattern, &elastic(subdomain, &material, &pattern));
                 let mut forces = vec![0.0; u.len()];
-                let found = internal::add_forces(subdomain, &material, &[], &u, &mut forces);
+                let found = internal::add_forces(&Region::virgin(subdomain, &material), &u, &mut forces);
                 let ku = &k * column(&u);
                 assert_close(&column(&forces), &ku, 1e-13);
                 let square = (column(&u).transpose() * ku)[(0, 0)];
                 assert!((found.energy - 0.5 * square).abs() < 1e-13 * square);
-                let [norm] = internal::elastic_squares(subdomain, &material, [&u]);
+                let [norm] = internal::elastic_squares(&Region::virgin(subdomain, &material), [&u]);
                 assert!((norm - square).abs() < 1e-13 * square);
             }
         });
@@ -124,7 +125,7 @@ fn rigid_motions_meet_no_stiffness_in_any_shape_elastic_or_plastic() {
                 let pattern = pattern_of(subdomain);
                 let mut values = vec![0.0; pattern.rows.len()];
                 let u = linear_field(subdomain, if own % 2 == 0 { 0.0 } else { 0.1 });
-                stiffness::assemble(subdomain, &STEEL, &[], (&u, &[]), &pattern, &mut values);
+                stiffness::assemble(&Region::virgin(subdomain, &MATERIAL), (&u, &[]), &pattern, &mut values);
                 blocks.push(dense(&pattern, &values));
             }
             let k = block_diagonal(&blocks);
@@ -140,7 +141,7 @@ fn forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces() {
         on_ranks(&scene, 1, |setup| {
             let fields = setup.displacements(9).into_iter().zip(setup.displacements(10));
             for (subdomain, (u, direction)) in setup.subdomains().iter().zip(fields) {
-                let material = half_yielding(subdomain, &u);
+                let material = half_yielding(subdomain, &u).into();
                 assert_derivatives(subdomain, &material, &[], &u, &direction);
             }
         });
@@ -154,12 +155,15 @@ fn the_same_holds_after_a_commit_which_keeps_forces_and_makes_the_answer_elastic
             let before = setup.displacements(11).into_iter().zip(setup.displacements(9));
             for (subdomain, ((old, u), direction)) in setup.subdomains().iter().zip(before.zip(setup.displacements(10)))
             {
-                let material = Material { kinematic_hardening: 3e4, ..half_yielding(subdomain, &old) };
-                let mut history = Vec::new();
-                internal::commit(subdomain, &material, &old, &mut history);
+                let material = VonMises { kinematic_hardening: 3e4, ..half_yielding(subdomain, &old) }.into();
+                let history = internal::commit(&Region::virgin(subdomain, &material), &old);
                 let at = |history: &[History]| {
                     let mut forces = vec![0.0; u.len()];
-                    (internal::add_forces(subdomain, &material, history, &old, &mut forces).plastic, forces)
+                    (
+                        internal::add_forces(&Region { subdomain, material: &material, history }, &old, &mut forces)
+                            .plastic,
+                        forces,
+                    )
                 };
                 let (flowing, waiting) = (at(&[]), at(&history));
                 assert_close(&column(&waiting.1), &column(&flowing.1), 1e-12);
@@ -175,7 +179,7 @@ fn assert_derivatives(subdomain: &Subdomain, material: &Material, history: &[His
     let at = |by: f64| {
         let moved: Vec<f64> = u.iter().zip(direction).map(|(u, d)| u + by * d).collect();
         let mut forces = vec![0.0; u.len()];
-        let found = internal::add_forces(subdomain, material, history, &moved, &mut forces);
+        let found = internal::add_forces(&Region { subdomain, material, history }, &moved, &mut forces);
         (found, forces)
     };
     let h = 1e-6;
@@ -187,16 +191,18 @@ fn assert_derivatives(subdomain: &Subdomain, material: &Material, history: &[His
 
     let pattern = pattern_of(subdomain);
     let mut values = vec![0.0; pattern.rows.len()];
-    let plastic = stiffness::assemble(subdomain, material, history, (u, &[]), &pattern, &mut values);
+    let plastic = stiffness::assemble(&Region { subdomain, material, history }, (u, &[]), &pattern, &mut values);
     assert_eq!(plastic, here.0.plastic);
     let change: Vec<f64> = ahead.1.iter().zip(&back.1).map(|(a, b)| (a - b) / (2.0 * h)).collect();
     assert_close(&column(&change), &(dense(&pattern, &values) * column(direction)), 1e-6);
 }
 
 /// A material of which at least half of the elements, but not all, yield at `u`.
-fn half_yielding(subdomain: &Subdomain, u: &[f64]) -> Material {
-    let material = |k: i32| Material { yield_stress: Some(STEEL.young * 0.9_f64.powi(k)), ..STEEL };
-    let plastic = |m: &Material| internal::add_forces(subdomain, m, &[], u, &mut vec![0.0; u.len()]).plastic;
+fn half_yielding(subdomain: &Subdomain, u: &[f64]) -> VonMises {
+    let material = |k: i32| VonMises { yield_stress: Some(STEEL.young * 0.9_f64.powi(k)), ..STEEL };
+    let plastic = |m: &VonMises| {
+        internal::add_forces(&Region::virgin(subdomain, &Material::from(*m)), u, &mut vec![0.0; u.len()]).plastic
+    };
     let elements = subdomain.elements.len();
     let found = (-20..100).map(material).find(|m| 2 * plastic(m) >= elements).expect("everything yields at last");
     assert!(plastic(&found) < elements);
@@ -271,11 +277,12 @@ fn pressure_all_round_is_the_force_of_hydrostatic_stress_and_has_no_resultant() 
         let subdomain = &setup.subdomains()[0];
         let mut forces = vec![0.0; subdomain.dofs()];
         loads::add(subdomain, &setup.discrete.loads, &mut forces);
-        let material = Material::elastic(210.0, 0.29);
-        let stretch = -7.0 * (1.0 - 2.0 * material.poisson) / material.young;
+        let material = Material::from(VonMises::elastic(210.0, 0.29));
+        let Hooke { young, poisson } = material.hooke();
+        let stretch = -7.0 * (1.0 - 2.0 * poisson) / young;
         let u: Vec<f64> = subdomain.points.as_flattened().iter().map(|x| stretch * x).collect();
         let mut internal = vec![0.0; subdomain.dofs()];
-        internal::add_forces(subdomain, &material, &[], &u, &mut internal);
+        internal::add_forces(&Region::virgin(subdomain, &material), &u, &mut internal);
         assert_close(&column(&forces), &column(&internal), 1e-12);
         let resultants = setup.modes[0].resultants(&subdomain.points, &forces);
         assert!(size(&resultants) < 1e-12 * size(&forces), "{resultants:?}");

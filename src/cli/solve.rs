@@ -10,6 +10,7 @@ use super::levels::{Setting, carry_out};
 use super::plan::Plan;
 use super::{Failure, Source, find, values};
 use crate::comm::Comm;
+use crate::material::Law;
 use crate::monitor::timing::Timer;
 use crate::scene::{Preconditioner, Qp, Scene};
 
@@ -52,7 +53,7 @@ impl Cascade {
     /// The levels to solve before `level`, coarsest first. None where there is a history, of which a coarser
     /// level knows the end, or an earlier state, which is of one mesh.
     fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
-        let linear = scene.contact.is_empty() && scene.material.values().all(|m| m.yield_stress.is_none());
+        let linear = scene.contact.is_empty() && !scene.material.values().any(Law::yields);
         if self == Self::Off || !scene.step.is_empty() || scene.initial.is_some() || (self == Self::Auto && linear) {
             return Vec::new();
         }

@@ -6,9 +6,9 @@ use clap::Args;
 
 use super::{Failure, is_mute};
 use crate::comm::Comm;
+use crate::element::Kind;
 use crate::results::replace::{self, Form};
 use crate::results::write_json;
-use crate::scene::Element;
 use crate::verify::{self, Measured, Report};
 
 /// Arguments of `verify`.
@@ -19,7 +19,7 @@ pub struct Verify {
     cases: Vec<String>,
     /// Only this element: tet4, hex8 or tet10.
     #[arg(long, value_name = "NAME", value_parser = element)]
-    element: Option<Element>,
+    element: Option<Kind>,
     /// Write errors, counts and times as JSON.
     #[arg(long, value_name = "FILE")]
     summary: Option<PathBuf>,
@@ -32,9 +32,10 @@ impl Verify {
     }
 }
 
-fn element(text: &str) -> Result<Element, String> {
+fn element(text: &str) -> Result<Kind, String> {
     let found = verify::ELEMENTS.into_iter().find(|element| element.name() == text);
-    found.ok_or_else(|| "it is tet4, hex8 or tet10".into())
+    let [others @ .., last] = verify::ELEMENTS.map(Kind::name);
+    found.ok_or_else(|| format!("it is {} or {last}", others.join(", ")))
 }
 
 /// Runs cases and says what became of them: exit code 0 if all demands are met. Collective.
@@ -48,9 +49,8 @@ pub fn verify(arguments: &Verify, comm: &dyn Comm) -> Result<i32, Failure> {
     let mut report = Report { cases: Vec::new(), passed: true };
     for case in verify::select(&arguments.cases).unwrap_or_default() {
         tracing::info!("{}: {}", case.name(), case.about());
-        let wanted = |element: &Element| {
-            arguments.element.is_none_or(|only| only == *element) && !case.levels(*element).is_empty()
-        };
+        let wanted =
+            |element: &Kind| arguments.element.is_none_or(|only| only == *element) && !case.levels(*element).is_empty();
         if is_mute(comm) {
             return Err(Failure::Mute { path: None });
         }

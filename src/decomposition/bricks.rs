@@ -47,7 +47,7 @@ impl<'a> Boxes<'a> {
         for k in low[2]..low[2] + self.cells[2] {
             for j in low[1]..low[1] + self.cells[1] {
                 let row = brick.cell([low[0], j, k]);
-                let per_cell = self.bodies[body].kind.per_cell();
+                let per_cell = self.bodies[body].kind.cell().per_hexahedron();
                 elements.extend(per_cell * row..per_cell * (row + self.cells[0] as u64));
             }
         }

@@ -21,7 +21,7 @@ pub use subdomain::Subdomain;
 use std::collections::BTreeMap;
 
 use crate::comm::{Comm, Shares};
-use crate::element::{Kind, hex8, tet10};
+use crate::element::{Cell, Kind};
 use crate::mesh::{Brick, Face, SolidMesh};
 
 /// A surface that a support, load or contact names.
@@ -95,18 +95,19 @@ impl BodyMesh {
     /// If the body is no brick.
     pub fn element(&self, element: u64) -> Vec<u64> {
         let brick = self.brick().expect("the body is a brick");
-        match self.kind {
-            Kind::Tet4 => brick.tet(element).to_vec(),
-            Kind::Tet10 => {
-                // Nodes are on a lattice twice as fine, which corners and middles of edges fill.
-                let lattice = brick.refined(2);
-                let corners = brick.tet(element).map(|node| brick.node_position(node));
-                let middle = |a: usize, b: usize| std::array::from_fn(|i| corners[a][i] + corners[b][i]);
-                let of_corners = (0..4).map(|a| lattice.node(middle(a, a)));
-                of_corners.chain(tet10::EDGES.iter().map(|&(a, b)| lattice.node(middle(a, b)))).collect()
-            }
-            Kind::Hex8 => brick.hexahedron(element).to_vec(),
+        let corners = match self.kind.cell() {
+            Cell::Tetrahedron => brick.tet(element).to_vec(),
+            Cell::Hexahedron => brick.hexahedron(element).to_vec(),
+        };
+        if self.kind.middles().is_empty() {
+            return corners;
         }
+        // Nodes are on a finer lattice, which corners and middles of edges fill.
+        let lattice = brick.refined(self.kind.degree());
+        let corners: Vec<[usize; 3]> = corners.into_iter().map(|node| brick.node_position(node)).collect();
+        let middle = |a: usize, b: usize| std::array::from_fn(|i| corners[a][i] + corners[b][i]);
+        let of_corners = (0..corners.len()).map(|a| lattice.node(middle(a, a)));
+        of_corners.chain(self.kind.middles().iter().map(|&(a, b)| lattice.node(middle(a, b)))).collect()
     }
 
     /// The element of a brick around a point inside it, given in cells from its origin: node numbers within the body, and
@@ -116,16 +117,14 @@ impl BodyMesh {
     /// If the body is no brick.
     pub fn around(&self, at: [f64; 3]) -> (Vec<u64>, Vec<f64>) {
         let brick = self.brick().expect("the body is a brick");
-        match self.kind {
-            Kind::Tet4 | Kind::Tet10 => {
-                let (element, values) = brick.tet_around(at);
-                let quadratic = self.kind == Kind::Tet10;
-                (self.element(element), if quadratic { tet10::values(values).to_vec() } else { values.to_vec() })
+        match self.kind.cell() {
+            Cell::Tetrahedron => {
+                let (element, at) = brick.tet_around(at);
+                (self.element(element), self.kind.values(&at))
             }
-            Kind::Hex8 => {
+            Cell::Hexahedron => {
                 let (cell, inside) = brick.around(at);
-                let values = hex8::values(inside.map(|x| 2.0 * x - 1.0));
-                (brick.hexahedron(brick.cell(cell)).to_vec(), values.to_vec())
+                (self.element(brick.cell(cell)), self.kind.values(&inside.map(|x| 2.0 * x - 1.0)))
             }
         }
     }
@@ -135,7 +134,7 @@ impl BodyMesh {
         match &self.shape {
             Shape::Brick(brick) => {
                 let (cells, nodes) = (brick.cell_count(), self.lattice().map_or(0, |lattice| lattice.node_count()));
-                Counts { nodes, cells, elements: self.kind.per_cell() * cells }
+                Counts { nodes, cells, elements: self.kind.cell().per_hexahedron() * cells }
             }
             Shape::Mesh(counts) => *counts,
         }

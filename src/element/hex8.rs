@@ -5,7 +5,7 @@
 //!
 //! Corners in the order of VTK: 0, 1, 2, 3 around the bottom, counter-clockwise from above, 4, 5, 6, 7 above them.
 
-use super::{DEGENERATE, Nodal, Point, map};
+use super::{Cell, DEGENERATE, Element, Gmsh, Nodal, Point, Sample, map};
 
 /// Corners of the reference cube `[-1, 1]^3`.
 pub const CORNERS: Nodal<8> = [
@@ -22,14 +22,65 @@ pub const CORNERS: Nodal<8> = [
 /// Coordinates of the Gauss points in the reference cube, up to signs: one over the root of three.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
 
+/// The element.
+pub struct Hex8;
+
+impl Element<8, 8> for Hex8 {
+    const CELL: Cell = Cell::Hexahedron;
+    const DEGREE: usize = 1;
+    const FACES: &'static [&'static [usize]] =
+        &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
+    const MIDDLES: &'static [(usize, usize)] = &[];
+    const TETRAHEDRA: u64 = 6;
+    const BEST_AT_CENTRE: bool = true;
+    const VTK: u8 = 12;
+    const GMSH: Gmsh = Gmsh {
+        cell: 5,
+        face: 3,
+        order: &[0, 1, 2, 3, 4, 5, 6, 7],
+        needs: Some(
+            "hexahedra alone: mesh with `Transfinite Volume` and `Recombine Surface`, or `Mesh.SubdivisionAlgorithm = 2;`, or \
+             take element = \"tet4\"",
+        ),
+    };
+
+    #[inline]
+    fn points(nodes: &Nodal<8>) -> Option<[Point<8>; 8]> {
+        points(nodes)
+    }
+
+    fn values_at_points() -> [[f64; 8]; 8] {
+        CORNERS.map(|corner| values(corner.map(|x| GAUSS * x)))
+    }
+
+    fn shape(nodes: &Nodal<8>) -> f64 {
+        shape(nodes)
+    }
+
+    fn values(at: &[f64]) -> [f64; 8] {
+        values(place(at))
+    }
+
+    /// The integration points are the corners of a smaller cube.
+    fn from_points(at: &[f64]) -> [f64; 8] {
+        values(place(at).map(|x| 3_f64.sqrt() * x))
+    }
+
+    /// Without mean dilatation.
+    fn sample(nodes: &Nodal<8>, at: &[f64], weight: f64) -> Sample {
+        let point = self::at(nodes, &place(at));
+        Sample { weight: weight * point.weight, values: Self::values(at).to_vec(), gradients: point.gradients.to_vec() }
+    }
+}
+
+/// A place in the reference cube.
+fn place(at: &[f64]) -> [f64; 3] {
+    at.try_into().expect("a place in a hexahedron has three coordinates")
+}
+
 /// Values of the shape functions at a point of the reference cube.
 pub fn values(at: [f64; 3]) -> [f64; 8] {
     CORNERS.map(|corner| (0..3).map(|i| 0.5 * (1.0 + corner[i] * at[i])).product())
-}
-
-/// Values of the shape functions at the integration points.
-pub fn values_at_points() -> [[f64; 8]; 8] {
-    CORNERS.map(|corner| values(corner.map(|x| GAUSS * x)))
 }
 
 /// The integration points, and `None` if the [`shape`] is [`DEGENERATE`].
@@ -87,7 +138,7 @@ const EDGES: [(usize, usize); 12] =
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::Material;
+    use crate::material::{Law, VonMises};
     use crate::random::Random;
     use crate::tensor::{apply, contract, trace};
 
@@ -142,7 +193,7 @@ mod tests {
     /// Where the dilatation is constant anyway, full integration gives the same; where it is not, more energy.
     #[test]
     fn b_bar_is_full_integration_for_constant_dilatation_and_softer_otherwise() {
-        let c = Material::elastic(1.0, 0.45).elastic_tangent();
+        let c = VonMises::elastic(1.0, 0.45).hooke().tangent();
         let nodes = CORNERS.map(|[x, y, z]| [1.3 * x, 0.7 * y, z]);
         let points = points(&nodes).expect("it has a volume");
         let energy = |u: &Nodal<8>, with: bool| -> f64 {

@@ -1,77 +1,105 @@
-//! Which elements there are. Nodes and faces are numbered as VTK and Gmsh do.
+//! Which elements there are, and their [facts](super::Element) where the kind is known at run time only.
 
-use super::{hex8, tet4, tet10};
+use serde::{Deserialize, Serialize};
 
-/// A kind of finite element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
-    /// The linear tetrahedron.
-    Tet4,
-    /// The quadratic tetrahedron.
-    Tet10,
-    /// The trilinear hexahedron with mean dilatation.
-    Hex8,
+use super::{Cell, Element, Gmsh, Nodal, Sample};
+
+/// The enum of all kinds, their names (those of their files), and `by_kind!`.
+macro_rules! kinds {
+    ($dollar:tt: $($(#[$about:meta])* $kind:ident = $name:ident,)+) => {
+        /// A kind of finite element. Scenes call it by the name of its file.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "lowercase")]
+        pub enum Kind {
+            $($(#[$about])* $kind,)+
+        }
+
+        impl Kind {
+            /// All kinds.
+            pub const ALL: &[Self] = &[$(Self::$kind),+];
+
+            /// Its name, as in scene files.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$kind => stringify!($name),)+
+                }
+            }
+        }
+
+        /// `by_kind!(kind, E => expression)`: the expression with `E` as the type of the kind.
+        macro_rules! by_kind {
+            ($dollar kind:expr, $dollar E:ident => $dollar body:expr) => {
+                match $dollar kind {
+                    $($crate::element::Kind::$kind => {
+                        type $dollar E = $crate::element::$name::$kind;
+                        $dollar body
+                    })+
+                }
+            };
+        }
+    };
 }
+
+// The one list of elements.
+kinds! { $:
+    /// The linear tetrahedron.
+    Tet4 = tet4,
+    /// The quadratic tetrahedron.
+    Tet10 = tet10,
+    /// The trilinear hexahedron with mean dilatation.
+    Hex8 = hex8,
+}
+pub(crate) use by_kind;
 
 impl Kind {
     /// Nodes of an element.
     pub fn nodes(self) -> usize {
-        match self {
-            Self::Tet4 => 4,
-            Self::Tet10 => 10,
-            Self::Hex8 => 8,
-        }
+        by_kind!(self, E => E::NODES)
     }
 
     /// Integration points of an element.
     pub fn points(self) -> usize {
-        match self {
-            Self::Tet4 => 1,
-            Self::Tet10 => 4,
-            Self::Hex8 => 8,
-        }
+        by_kind!(self, E => E::POINTS)
+    }
+
+    /// The cell that it maps into space.
+    pub fn cell(self) -> Cell {
+        by_kind!(self, E => E::CELL)
     }
 
     /// Local nodes of each face, counter-clockwise from outside: corners, then the middles of the edges between them.
     pub fn faces(self) -> &'static [&'static [usize]] {
-        match self {
-            Self::Tet4 => &[&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[0, 3, 2]],
-            Self::Tet10 => &[&[0, 2, 1, 6, 5, 4], &[0, 1, 3, 4, 8, 7], &[1, 2, 3, 5, 9, 8], &[0, 3, 2, 7, 9, 6]],
-            Self::Hex8 => &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]],
-        }
+        by_kind!(self, E => E::FACES)
+    }
+
+    /// Corners of the edge of each node that is no corner. These nodes come behind the corners.
+    pub fn middles(self) -> &'static [(usize, usize)] {
+        by_kind!(self, E => E::MIDDLES)
     }
 
     /// Degree of the shape functions along an edge.
     pub fn degree(self) -> usize {
-        match self {
-            Self::Tet4 | Self::Hex8 => 1,
-            Self::Tet10 => 2,
-        }
-    }
-
-    /// Corners of a face.
-    pub fn corners_of_face(self) -> usize {
-        match self {
-            Self::Tet4 | Self::Tet10 => 3,
-            Self::Hex8 => 4,
-        }
-    }
-
-    /// Elements that fill one hexahedral cell.
-    pub fn per_cell(self) -> u64 {
-        match self {
-            Self::Tet4 | Self::Tet10 => 6,
-            Self::Hex8 => 1,
-        }
+        by_kind!(self, E => E::DEGREE)
     }
 
     /// Linear tetrahedra with as many nodes: what an element costs to solve for.
     pub fn tetrahedra(self) -> u64 {
-        match self {
-            Self::Tet4 => 1,
-            Self::Tet10 => 8,
-            Self::Hex8 => 6,
-        }
+        by_kind!(self, E => E::TETRAHEDRA)
+    }
+
+    /// Whether stresses are most accurate at the centre, rather than at the integration points.
+    pub fn best_at_centre(self) -> bool {
+        by_kind!(self, E => E::BEST_AT_CENTRE)
+    }
+
+    /// VTK's number of the cell.
+    pub fn vtk(self) -> u8 {
+        by_kind!(self, E => E::VTK)
+    }
+
+    /// How Gmsh knows it.
+    pub fn gmsh(self) -> Gmsh {
+        by_kind!(self, E => E::GMSH)
     }
 
     /// How good the shape of an element is: 1 at best, negative if it is inverted.
@@ -79,11 +107,34 @@ impl Kind {
     /// # Panics
     /// If it has another number of nodes.
     pub fn shape(self, nodes: &[[f64; 3]]) -> f64 {
-        let whole = "an element has all its nodes";
-        match self {
-            Self::Tet4 => tet4::shape(nodes.try_into().expect(whole)),
-            Self::Tet10 => tet10::shape(nodes.try_into().expect(whole)),
-            Self::Hex8 => hex8::shape(nodes.try_into().expect(whole)),
-        }
+        by_kind!(self, E => E::shape(whole(nodes)))
     }
+
+    /// Values of the shape functions at a place of the [cell](Self::cell).
+    ///
+    /// # Panics
+    /// If the place has another number of coordinates.
+    pub fn values(self, at: &[f64]) -> Vec<f64> {
+        by_kind!(self, E => E::values(at).to_vec())
+    }
+
+    /// What is known at the integration points is, at a place of the [cell](Self::cell), this combination of it.
+    ///
+    /// # Panics
+    /// If the place has another number of coordinates.
+    pub fn from_points(self, at: &[f64]) -> Vec<f64> {
+        by_kind!(self, E => E::from_points(at).to_vec())
+    }
+
+    /// A place of the [cell](Self::cell) of the element on these nodes, with a weight there.
+    ///
+    /// # Panics
+    /// If it has another number of nodes, or no volume.
+    pub fn sample(self, nodes: &[[f64; 3]], at: &[f64], weight: f64) -> Sample {
+        by_kind!(self, E => E::sample(whole(nodes), at, weight))
+    }
+}
+
+fn whole<const N: usize>(nodes: &[[f64; 3]]) -> &Nodal<N> {
+    nodes.try_into().expect("an element has all its nodes")
 }

@@ -2,7 +2,7 @@
 //!
 //! 27 Gauss points, on tetrahedra folded towards the last corners: exact for polynomials of degree three and more.
 
-use super::{Kind, hex8, tet4, tet10};
+use super::{Cell, Kind};
 
 /// A point of an element. Mean dilatation is left out: gradients are those of the displacement.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,24 +28,15 @@ pub fn samples(kind: Kind, nodes: &[[f64; 3]]) -> Vec<Sample> {
 }
 
 fn sample(kind: Kind, nodes: &[[f64; 3]], [(r, a), (s, b), (t, c)]: [(f64, f64); 3]) -> Sample {
-    let whole = "an element has all its nodes";
-    if kind == Kind::Hex8 {
-        let point = hex8::at(nodes.try_into().expect(whole), &[r, s, t]);
-        let values = hex8::values([r, s, t]).to_vec();
-        return Sample { weight: a * b * c * point.weight, values, gradients: point.gradients.to_vec() };
+    match kind.cell() {
+        Cell::Hexahedron => kind.sample(nodes, &[r, s, t], a * b * c),
+        Cell::Tetrahedron => {
+            let [r, s, t] = [r, s, t].map(|x| 0.5 * (1.0 + x));
+            let at = [r * (1.0 - s) * (1.0 - t), s * (1.0 - t), t];
+            let folded = a * b * c / 8.0 * (1.0 - s) * (1.0 - t) * (1.0 - t);
+            kind.sample(nodes, &[1.0 - at[0] - at[1] - at[2], at[0], at[1], at[2]], folded)
+        }
     }
-    let [r, s, t] = [r, s, t].map(|x| 0.5 * (1.0 + x));
-    let at = [r * (1.0 - s) * (1.0 - t), s * (1.0 - t), t];
-    let barycentric = [1.0 - at[0] - at[1] - at[2], at[0], at[1], at[2]];
-    let folded = a * b * c / 8.0 * (1.0 - s) * (1.0 - t) * (1.0 - t);
-    if kind == Kind::Tet10 {
-        let point = tet10::at(nodes.try_into().expect(whole), &barycentric);
-        let values = tet10::values(barycentric).to_vec();
-        return Sample { weight: folded * point.weight, values, gradients: point.gradients.to_vec() };
-    }
-    let [point] = tet4::points(nodes.try_into().expect(whole)).expect("elements of a checked mesh have volume");
-    let weight = folded * 6.0 * point.weight;
-    Sample { weight, values: barycentric.to_vec(), gradients: point.gradients.to_vec() }
 }
 
 impl Sample {
@@ -65,6 +56,7 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::{hex8, tet10};
 
     /// Integrals over a box, or a corner of it, of a cubic monomial, and the strain of a linear field.
     #[test]

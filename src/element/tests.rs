@@ -5,7 +5,8 @@ use std::array::from_fn;
 use super::point::block;
 use super::{Nodal, Point, hex8, tet4, tet10};
 use crate::material::samples::STEEL;
-use crate::material::{History, Material};
+use crate::material::von_mises::{PlasticState, VonMises};
+use crate::material::{Law, Variables};
 use crate::random::Random;
 use crate::tensor::{Tangent, apply};
 
@@ -92,7 +93,7 @@ fn linear_displacements_give_their_strain_exactly() {
 }
 
 fn has_six_free_motions<const N: usize, const P: usize>(nodes: Nodal<N>, points: [Point<N>; P]) {
-    let k = stiffness(&points, |_| STEEL.elastic_tangent());
+    let k = stiffness(&points, |_| STEEL.hooke().tangent());
     let scale = k[0][0][0][0];
     for axis in 0..3 {
         let along = [std::array::from_fn(|i| f64::from(i == axis)); N];
@@ -118,7 +119,7 @@ fn stiffness_is_symmetric_and_blind_to_rigid_motion_only() {
 }
 
 fn answers_elastic_motions_by_its_stiffness<const N: usize, const P: usize>(_: Nodal<N>, points: [Point<N>; P]) {
-    let c = STEEL.elastic_tangent();
+    let c = STEEL.hooke().tangent();
     let u = random_field(&mut Random::new(9), 1.0);
     let mut internal = [[0.0; 3]; N];
     points.iter().for_each(|point| point.add_internal(&apply(&c, &point.strain(&u)), &mut internal));
@@ -136,8 +137,8 @@ fn elastic_internal_forces_are_stiffness_times_displacement() {
 /// Plastic included: forces are the derivative of the energy, the stiffness that of the forces.
 fn has_right_derivatives<const N: usize, const P: usize>(_: Nodal<N>, points: [Point<N>; P]) {
     let mut random = Random::new(10);
-    let material = Material { hardening: 2e4, ..STEEL };
-    let virgin = History::default();
+    let material = VonMises { hardening: 2e4, ..STEEL };
+    let virgin = PlasticState::VIRGIN;
     let (u, direction): (Nodal<N>, Nodal<N>) = (random_field(&mut random, 0.2), random_field(&mut random, 1.0));
     let at = |by: f64| {
         let moved: Nodal<N> = std::array::from_fn(|a| std::array::from_fn(|i| u[a][i] + by * direction[a][i]));

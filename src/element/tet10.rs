@@ -2,14 +2,62 @@
 //! (the order of VTK). Four Gauss points of degree two: exact for straight edges, and no motion but the rigid ones is
 //! free, as 4 x 6 strains and 6 motions make 30 unknowns. Edges may be curved; the map is that of the displacement.
 
-use super::{DEGENERATE, Nodal, Point, map};
+use super::cell::{EDGES_OF_TETRAHEDRON, FAR, NEAR, barycentric, four_points};
+use super::{Cell, DEGENERATE, Element, Gmsh, Nodal, Point, Sample, map};
 
 /// Corners of each edge, by its middle node less 4.
-pub const EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)];
+pub const EDGES: [(usize, usize); 6] = EDGES_OF_TETRAHEDRON;
 
-/// Barycentric coordinates of the Gauss points: one is near each corner (Hammer, Marlowe and Stroud 1956).
-const NEAR: f64 = 0.585_410_196_624_968_5;
-const FAR: f64 = 0.138_196_601_125_010_5;
+/// The element.
+pub struct Tet10;
+
+impl Element<10, 4> for Tet10 {
+    const CELL: Cell = Cell::Tetrahedron;
+    const DEGREE: usize = 2;
+    const FACES: &'static [&'static [usize]] =
+        &[&[0, 2, 1, 6, 5, 4], &[0, 1, 3, 4, 8, 7], &[1, 2, 3, 5, 9, 8], &[0, 3, 2, 7, 9, 6]];
+    const MIDDLES: &'static [(usize, usize)] = &EDGES;
+    const TETRAHEDRA: u64 = 8;
+    const BEST_AT_CENTRE: bool = false;
+    const VTK: u8 = 24;
+    const GMSH: Gmsh = Gmsh {
+        cell: 11,
+        face: 9,
+        // Gmsh has the last two middles the other way round.
+        order: &[0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
+        needs: Some(
+            "tetrahedra of second order alone: mesh with `Mesh.ElementOrder = 2;` or `SetOrder 2;` and without `Recombine`, \
+             or take another element",
+        ),
+    };
+
+    #[inline]
+    fn points(nodes: &Nodal<10>) -> Option<[Point<10>; 4]> {
+        points(nodes)
+    }
+
+    fn values_at_points() -> [[f64; 10]; 4] {
+        four_points().map(values)
+    }
+
+    fn shape(nodes: &Nodal<10>) -> f64 {
+        shape(nodes)
+    }
+
+    fn values(at: &[f64]) -> [f64; 10] {
+        values(barycentric(at))
+    }
+
+    fn from_points(at: &[f64]) -> [f64; 4] {
+        barycentric(at).map(|a| (a - FAR) / (NEAR - FAR))
+    }
+
+    fn sample(nodes: &Nodal<10>, at: &[f64], weight: f64) -> Sample {
+        let point = self::at(nodes, &barycentric(at));
+        let values = Self::values(at).to_vec();
+        Sample { weight: weight * point.weight, values, gradients: point.gradients.to_vec() }
+    }
+}
 
 /// Values of the shape functions at barycentric coordinates.
 pub fn values(at: [f64; 4]) -> [f64; 10] {
@@ -19,32 +67,12 @@ pub fn values(at: [f64; 4]) -> [f64; 10] {
     values
 }
 
-/// Values of the shape functions at the integration points.
-pub fn values_at_points() -> [[f64; 10]; 4] {
-    std::array::from_fn(|near| values(place(near)))
-}
-
-/// Barycentric coordinates of the integration points.
-pub fn places() -> [[f64; 4]; 4] {
-    std::array::from_fn(place)
-}
-
-/// At barycentric coordinates, a linear function is this combination of its values at the integration points.
-pub fn from_points(at: [f64; 4]) -> [f64; 4] {
-    at.map(|a| (a - FAR) / (NEAR - FAR))
-}
-
-/// Barycentric coordinates of the Gauss point near a corner.
-fn place(near: usize) -> [f64; 4] {
-    std::array::from_fn(|a| if a == near { NEAR } else { FAR })
-}
-
 /// The integration points, and `None` if the [`shape`] is [`DEGENERATE`].
 #[inline]
 pub fn points(nodes: &Nodal<10>) -> Option<[Point<10>; 4]> {
     (shape(nodes) > DEGENERATE).then(|| {
-        std::array::from_fn(|near| {
-            let point = at(nodes, &place(near));
+        four_points().map(|place| {
+            let point = at(nodes, &place);
             Point { weight: point.weight / 24.0, ..point }
         })
     })
@@ -81,8 +109,7 @@ pub fn shape(nodes: &Nodal<10>) -> f64 {
     }
     let corner = |a: usize| std::array::from_fn(|b| f64::from(a == b));
     let middle = |(a, b): (usize, usize)| std::array::from_fn(|c| if c == a || c == b { 0.5 } else { 0.0 });
-    let gauss = |near: usize| std::array::from_fn(|a| if a == near { NEAR } else { FAR });
-    let places = (0..4).map(corner).chain(EDGES.map(middle)).chain((0..4).map(gauss));
+    let places = (0..4).map(corner).chain(EDGES.map(middle)).chain(four_points());
     let least = places.map(|at| map::determinant(nodes, &derivatives(&at))).fold(f64::INFINITY, f64::min);
     std::f64::consts::SQRT_2 * least / (longest * longest.sqrt())
 }

@@ -1,11 +1,51 @@
 //! The linear tetrahedron: constant gradients, one integration point, its volume as weight (Hughes, The Finite Element
 //! Method, 3.A). Locks in isochoric flow, as every conforming linear tetrahedron does; nothing here cures that.
 
-use super::{DEGENERATE, Nodal, Point};
+use super::cell::barycentric;
+use super::{Cell, DEGENERATE, Element, Gmsh, Nodal, Point, Sample};
 use crate::vector::{cross, dot};
 
-/// Values of the shape functions at the integration point.
-pub const VALUES: [[f64; 4]; 1] = [[0.25; 4]];
+/// The element.
+pub struct Tet4;
+
+impl Element<4, 1> for Tet4 {
+    const CELL: Cell = Cell::Tetrahedron;
+    const DEGREE: usize = 1;
+    const FACES: &'static [&'static [usize]] = &[&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[0, 3, 2]];
+    const MIDDLES: &'static [(usize, usize)] = &[];
+    const TETRAHEDRA: u64 = 1;
+    const BEST_AT_CENTRE: bool = false;
+    const VTK: u8 = 10;
+    const GMSH: Gmsh = Gmsh { cell: 4, face: 2, order: &[0, 1, 2, 3], needs: None };
+
+    #[inline]
+    fn points(corners: &Nodal<4>) -> Option<[Point<4>; 1]> {
+        points(corners)
+    }
+
+    fn values_at_points() -> [[f64; 4]; 1] {
+        [[0.25; 4]]
+    }
+
+    fn shape(corners: &Nodal<4>) -> f64 {
+        shape(corners)
+    }
+
+    fn values(at: &[f64]) -> [f64; 4] {
+        barycentric(at)
+    }
+
+    fn from_points(_: &[f64]) -> [f64; 1] {
+        [1.0]
+    }
+
+    fn sample(corners: &Nodal<4>, at: &[f64], weight: f64) -> Sample {
+        let [point] = points(corners).expect("elements of a checked mesh have volume");
+        // The reference tetrahedron has the volume 1/6.
+        let weight = weight * 6.0 * point.weight;
+        Sample { weight, values: at.to_vec(), gradients: point.gradients.to_vec() }
+    }
+}
 
 /// Six times the signed volume, and the edges from corner 0.
 fn edges(corners: &[[f64; 3]; 4]) -> (f64, [[f64; 3]; 3]) {

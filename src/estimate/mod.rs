@@ -28,23 +28,13 @@ mod recovery;
 mod rule;
 
 use self::rule::Place;
+use crate::assembly::Region;
 use crate::assembly::stress::{self, Sample};
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
-use crate::material::{History, Material};
+use crate::material::{Law, Material};
 use crate::tensor::Voigt;
-
-/// An own subdomain in the state that it is asked about.
-#[derive(Clone, Copy)]
-pub struct Part<'a> {
-    /// Its mesh.
-    pub subdomain: &'a Subdomain,
-    /// Its material.
-    pub material: &'a Material,
-    /// What its integration points remember.
-    pub history: &'a [History],
-}
 
 /// Squares of the discretisation error of own elements, and of their stress.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,12 +46,12 @@ pub struct Estimate {
 }
 
 /// Estimates the error of the stresses at `u`. Collective.
-pub fn estimate(sums: &NodeSums, parts: &[Part], u: &Torn) -> Estimate {
-    let subdomains: Vec<&Subdomain> = parts.iter().map(|part| part.subdomain).collect();
+pub fn estimate(sums: &NodeSums, regions: &[Region], u: &Torn) -> Estimate {
+    let subdomains: Vec<&Subdomain> = regions.iter().map(|region| region.subdomain).collect();
     // All samples together would take more memory than it takes time to have them twice.
-    let recovered = recovery::recover(sums, &subdomains, |own| parts[own].samples(&u[own]));
+    let recovered = recovery::recover(sums, &subdomains, |own| stress::samples(&regions[own], &u[own]));
     let (mut errors, mut stresses) = (Vec::new(), Vec::new());
-    for ((part, u), recovered) in parts.iter().zip(u).zip(&recovered) {
+    for ((region, u), recovered) in regions.iter().zip(u).zip(&recovered) {
         let at = |nodes: &[u32], values: &[f64]| {
             let mut stress = [0.0; 6];
             for (&node, value) in nodes.iter().zip(values) {
@@ -69,56 +59,50 @@ pub fn estimate(sums: &NodeSums, parts: &[Part], u: &Torn) -> Estimate {
             }
             stress
         };
-        let samples = part.samples(u);
-        errors.push(part.squares(&samples, &rule::squares(part.subdomain.elements.kind()), at));
-        stresses.push(part.stress_square(&samples));
+        let samples = stress::samples(region, u);
+        errors.push(squares(region, &samples, &rule::squares(region.subdomain.elements.kind()), at));
+        stresses.push(stress_square(region.material, &samples));
     }
     Estimate { errors, stresses }
 }
 
 /// The error itself, in the same norm, where the exact stress is known: of an own subdomain at a place.
-pub fn error(parts: &[Part], u: &Torn, exact: impl Fn(usize, [f64; 3]) -> Voigt) -> Estimate {
+pub fn error(regions: &[Region], u: &Torn, exact: impl Fn(usize, [f64; 3]) -> Voigt) -> Estimate {
     let (mut errors, mut stresses) = (Vec::new(), Vec::new());
-    for (own, (part, u)) in parts.iter().zip(u).enumerate() {
-        let Subdomain { points, elements, .. } = part.subdomain;
+    for (own, (region, u)) in regions.iter().zip(u).enumerate() {
+        let Subdomain { points, elements, .. } = region.subdomain;
         let at = |nodes: &[u32], values: &[f64]| {
             let along = |i: usize| nodes.iter().zip(values).map(|(&n, value)| value * points[n as usize][i]).sum();
             exact(own, std::array::from_fn(along))
         };
-        let samples = part.samples(u);
-        errors.push(part.squares(&samples, &rule::fine(elements.kind()), at));
-        stresses.push(part.stress_square(&samples));
+        let samples = stress::samples(region, u);
+        errors.push(squares(region, &samples, &rule::fine(elements.kind()), at));
+        stresses.push(stress_square(region.material, &samples));
     }
     Estimate { errors, stresses }
 }
 
-impl Part<'_> {
-    /// `int sigma_h : C^-1 : sigma_h`.
-    fn stress_square(&self, samples: &[Sample]) -> f64 {
-        samples.iter().map(|s| s.weight * self.material.complementary_square(&s.stress)).sum()
-    }
+/// `int sigma_h : C^-1 : sigma_h`.
+fn stress_square(material: &Material, samples: &[Sample]) -> f64 {
+    samples.iter().map(|s| s.weight * material.hooke().complementary_square(&s.stress)).sum()
+}
 
-    fn samples(&self, u: &[f64]) -> Vec<Sample> {
-        stress::samples(self.subdomain, self.material, self.history, u)
-    }
-
-    /// `int (sigma - sigma_h) : C^-1 : (sigma - sigma_h)` over each element, where `stress` gives sigma from the nodes of an
-    /// element and the values of their shape functions.
-    fn squares(&self, samples: &[Sample], rule: &[Place], stress: impl Fn(&[u32], &[f64]) -> Voigt) -> Vec<f64> {
-        let Subdomain { elements, .. } = self.subdomain;
-        let of_element = |(nodes, samples): (&[u32], &[Sample])| {
-            let at = |place: &Place| {
-                let volume: f64 = place.volume.iter().zip(samples).map(|(c, s)| c * s.weight).sum();
-                let mut difference = stress(nodes, &place.nodes);
-                for (c, sample) in place.samples.iter().zip(samples) {
-                    difference.iter_mut().zip(sample.stress).for_each(|(d, s)| *d -= c * s);
-                }
-                volume * self.material.complementary_square(&difference)
-            };
-            rule.iter().map(at).sum()
+/// `int (sigma - sigma_h) : C^-1 : (sigma - sigma_h)` over each element, where `stress` gives sigma from the nodes of an
+/// element and the values of their shape functions.
+fn squares(region: &Region, samples: &[Sample], rule: &[Place], stress: impl Fn(&[u32], &[f64]) -> Voigt) -> Vec<f64> {
+    let elements = &region.subdomain.elements;
+    let of_element = |(nodes, samples): (&[u32], &[Sample])| {
+        let at = |place: &Place| {
+            let volume: f64 = place.volume.iter().zip(samples).map(|(c, s)| c * s.weight).sum();
+            let mut difference = stress(nodes, &place.nodes);
+            for (c, sample) in place.samples.iter().zip(samples) {
+                difference.iter_mut().zip(sample.stress).for_each(|(d, s)| *d -= c * s);
+            }
+            volume * region.material.hooke().complementary_square(&difference)
         };
-        elements.iter().zip(samples.chunks_exact(elements.kind().points())).map(of_element).collect()
-    }
+        rule.iter().map(at).sum()
+    };
+    elements.iter().zip(samples.chunks_exact(elements.kind().points())).map(of_element).collect()
 }
 
 #[cfg(test)]

@@ -6,7 +6,6 @@ use super::polynomial;
 use crate::assembly::stress::Sample;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
-use crate::element::{Kind, tet10};
 use crate::tensor::Voigt;
 
 /// How far polynomials reach from inside to the boundary: to vertices on faces, and from these to edges and corners that
@@ -48,19 +47,11 @@ struct Patches<'a> {
     open: Vec<Option<u32>>,
 }
 
-/// Vertices of an element, which come before its other nodes.
-fn corners(kind: Kind) -> usize {
-    match kind {
-        Kind::Tet4 | Kind::Tet10 => 4,
-        Kind::Hex8 => 8,
-    }
-}
-
 impl<'a> Patches<'a> {
     fn new(subdomain: &'a Subdomain) -> Self {
         let kind = subdomain.elements.kind();
         let mut vertex = vec![None; subdomain.nodes.len()];
-        let of_elements = subdomain.elements.iter().flat_map(|nodes| &nodes[..corners(kind)]);
+        let of_elements = subdomain.elements.iter().flat_map(|nodes| &nodes[..kind.cell().corners()]);
         of_elements.for_each(|&node| vertex[node as usize] = Some(0));
         let nodes: Vec<u32> = (0..vertex.len() as u32).filter(|&node| vertex[node as usize].is_some()).collect();
         nodes.iter().zip(0..).for_each(|(&node, number)| vertex[node as usize] = Some(number));
@@ -74,7 +65,7 @@ impl<'a> Patches<'a> {
 
     /// Vertices of each element.
     fn elements(&self) -> impl Iterator<Item = &[u32]> {
-        let corners = corners(self.subdomain.elements.kind());
+        let corners = self.subdomain.elements.kind().cell().corners();
         self.subdomain.elements.iter().map(move |nodes| &nodes[..corners])
     }
 
@@ -98,7 +89,7 @@ impl<'a> Patches<'a> {
         let mut sums = vec![0.0; width * self.nodes.len()];
         for (nodes, samples) in self.elements().zip(samples.chunks_exact(kind.points())) {
             for face in kind.faces() {
-                let face = &face[..kind.corners_of_face()];
+                let face = &face[..kind.cell().corners_of_face()];
                 let area = area(face.iter().map(|&local| self.point(nodes[local])));
                 for &local in face {
                     let sums = &mut sums[width * self.number(nodes[local])..][..CLOSURE];
@@ -107,7 +98,7 @@ impl<'a> Patches<'a> {
                 }
             }
             let centre = [centre(samples)];
-            let samples = if kind == Kind::Hex8 { &centre } else { samples };
+            let samples = if kind.best_at_centre() { &centre } else { samples };
             for &node in nodes {
                 let sums = &mut sums[width * self.number(node)..][CLOSURE..width];
                 for sample in samples {
@@ -183,17 +174,16 @@ impl<'a> Patches<'a> {
         for (vertex, &node) in self.nodes.iter().enumerate() {
             nodal[node as usize] = polynomial::value(self.polynomial(vertex), [0.0; 3]);
         }
-        if self.subdomain.elements.kind() == Kind::Tet10 {
-            for nodes in &self.subdomain.elements {
-                for (&middle, (a, b)) in nodes[4..].iter().zip(tet10::EDGES) {
-                    let from = |end: usize| {
-                        let way = polynomial::way(self.point(nodes[end]), self.point(middle));
-                        polynomial::value(self.polynomial(self.number(nodes[end])), way)
-                    };
-                    // In an order that all elements around the edge agree on.
-                    let (a, b) = if nodes[a] < nodes[b] { (from(a), from(b)) } else { (from(b), from(a)) };
-                    nodal[middle as usize] = std::array::from_fn(|s| 0.5 * (a[s] + b[s]));
-                }
+        let kind = self.subdomain.elements.kind();
+        for nodes in &self.subdomain.elements {
+            for (&middle, &(a, b)) in nodes[kind.cell().corners()..].iter().zip(kind.middles()) {
+                let from = |end: usize| {
+                    let way = polynomial::way(self.point(nodes[end]), self.point(middle));
+                    polynomial::value(self.polynomial(self.number(nodes[end])), way)
+                };
+                // In an order that all elements around the edge agree on.
+                let (a, b) = if nodes[a] < nodes[b] { (from(a), from(b)) } else { (from(b), from(a)) };
+                nodal[middle as usize] = std::array::from_fn(|s| 0.5 * (a[s] + b[s]));
             }
         }
         nodal

@@ -3,8 +3,9 @@
 //! Between the integration points of an element stresses are interpolated and extrapolated: constant in the linear
 //! tetrahedron, linear in the quadratic one, trilinear in the hexahedron. Volumes likewise.
 
+use crate::element::cell::{EDGES_OF_TETRAHEDRON, four_points};
 use crate::element::sample::GAUSS;
-use crate::element::{Kind, hex8, tet10};
+use crate::element::{Cell, Kind};
 
 /// A point of a rule.
 pub struct Place {
@@ -18,48 +19,41 @@ pub struct Place {
 
 /// Exact for squares of what shape functions interpolate, as long as edges are straight.
 pub fn squares(kind: Kind) -> Vec<Place> {
-    match kind {
-        Kind::Tet4 => {
-            // That of the quadratic tetrahedron is of degree two.
-            let places = tet10::places().map(|at| tetrahedron(kind, at, 0.25));
-            places.into()
-        }
-        Kind::Tet10 => of_degree_five(kind),
-        Kind::Hex8 => gauss(&[(-1.0 / 3_f64.sqrt(), 1.0), (1.0 / 3_f64.sqrt(), 1.0)]),
+    match (kind.cell(), kind.degree()) {
+        (Cell::Tetrahedron, 1) => four_points().map(|at| tetrahedron(kind, at, 0.25)).into(),
+        (Cell::Tetrahedron, _) => of_degree_five(kind),
+        (Cell::Hexahedron, 1) => gauss(kind, &[(-1.0 / 3_f64.sqrt(), 1.0), (1.0 / 3_f64.sqrt(), 1.0)]),
+        (Cell::Hexahedron, _) => gauss(kind, &GAUSS),
     }
 }
 
 /// For functions that elements do not know: of degree five.
 pub fn fine(kind: Kind) -> Vec<Place> {
-    match kind {
-        Kind::Hex8 => gauss(&GAUSS),
-        Kind::Tet4 | Kind::Tet10 => of_degree_five(kind),
+    match kind.cell() {
+        Cell::Hexahedron => gauss(kind, &GAUSS),
+        Cell::Tetrahedron => of_degree_five(kind),
     }
 }
 
-fn gauss(line: &[(f64, f64)]) -> Vec<Place> {
+/// Products of a rule along a line; volumes between the integration points are interpolated.
+fn gauss(kind: Kind, line: &[(f64, f64)]) -> Vec<Place> {
     let mut places = Vec::new();
     for (z, c) in line {
         for (y, b) in line {
             for (x, a) in line {
-                // The integration points are the corners of a smaller cube.
-                let samples = hex8::values([*x, *y, *z].map(|x| 3_f64.sqrt() * x)).to_vec();
+                let at = [*x, *y, *z];
+                let samples = kind.from_points(&at);
                 let volume = samples.iter().map(|s| a * b * c * s).collect();
-                places.push(Place { volume, samples, nodes: hex8::values([*x, *y, *z]).to_vec() });
+                places.push(Place { volume, samples, nodes: kind.values(&at) });
             }
         }
     }
     places
 }
 
+/// A place that stands for this share of the volume.
 fn tetrahedron(kind: Kind, at: [f64; 4], share: f64) -> Place {
-    match kind {
-        Kind::Tet10 => {
-            let samples = tet10::from_points(at).to_vec();
-            Place { volume: vec![share; 4], samples, nodes: tet10::values(at).to_vec() }
-        }
-        _ => Place { volume: vec![share], samples: vec![1.0], nodes: at.to_vec() },
-    }
+    Place { volume: vec![share; kind.points()], samples: kind.from_points(&at), nodes: kind.values(&at) }
 }
 
 /// 14 points (Walkington, "Quadrature on simplices of arbitrary dimension", 2000).
@@ -74,7 +68,7 @@ fn of_degree_five(kind: Kind) -> Vec<Place> {
         }
     }
     let near = 0.045_503_704_125_649_65;
-    for (a, b) in tet10::EDGES {
+    for (a, b) in EDGES_OF_TETRAHEDRON {
         let at = std::array::from_fn(|c| if c == a || c == b { 0.5 - near } else { near });
         places.push(tetrahedron(kind, at, 0.042_546_020_777_081_466));
     }
@@ -128,12 +122,12 @@ mod tests {
     #[test]
     fn linear_fields_pass_through_the_points_of_a_quadratic_tetrahedron() {
         let field = |at: [f64; 4]| 2.0 * at[0] - at[1] + 0.5 * at[3];
-        let samples = tet10::places().map(field);
+        let samples = four_points().map(field);
         for place in squares(Kind::Tet10) {
             // Corner values of a linear field are its nodal values; middles are means.
             let mut nodal = [0.0; 10];
             (0..4).for_each(|a| nodal[a] = field(std::array::from_fn(|b| f64::from(a == b))));
-            tet10::EDGES.iter().enumerate().for_each(|(k, &(a, b))| nodal[4 + k] = 0.5 * (nodal[a] + nodal[b]));
+            EDGES_OF_TETRAHEDRON.iter().enumerate().for_each(|(k, &(a, b))| nodal[4 + k] = 0.5 * (nodal[a] + nodal[b]));
             let expected: f64 = place.nodes.iter().zip(nodal).map(|(v, n)| v * n).sum();
             let found: f64 = place.samples.iter().zip(samples).map(|(c, s)| c * s).sum();
             assert!((found - expected).abs() < 1e-14);

@@ -12,11 +12,11 @@ fn errors(whole: &Subdomain, u: Vec<f64>, exact: &dyn Fn([f64; 3]) -> Voigt) -> 
     let shares = Shares(vec![1]);
     let clusters = Clusters::singles(&shares);
     let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
-    let part = Part { subdomain: whole, material: &orders::MATERIAL, history: &[] };
-    let c = orders::MATERIAL.elastic_tangent();
+    let region = Region::virgin(whole, &orders::MATERIAL);
+    let c = orders::MATERIAL.hooke().tangent();
     let u = vec![u];
-    let found = error(&[part], &u, |_, x| apply(&c, &exact(x)));
-    let estimated = estimate(&NodeSums::new(&Solo, &alone), &[part], &u);
+    let found = error(&[region], &u, |_, x| apply(&c, &exact(x)));
+    let estimated = estimate(&NodeSums::new(&Solo, &alone), &[region], &u);
     [estimated, found].map(|Estimate { errors, .. }| errors[0].iter().sum::<f64>().sqrt())
 }
 
@@ -86,12 +86,12 @@ fn the_estimate_is_near_the_error_in_a_hollow_sphere() {
 
 /// Pure bending about z (Timoshenko and Goodier 102): stress E x / R along y, linear elements see it constant.
 fn bending(x: [f64; 3]) -> [f64; 3] {
-    let nu = orders::MATERIAL.poisson;
+    let nu = orders::MATERIAL.hooke().poisson;
     [-0.5 * (x[1] * x[1] + nu * (x[0] * x[0] - x[2] * x[2])), x[0] * x[1], -nu * x[0] * x[2]]
 }
 
 fn bending_strain(x: [f64; 3]) -> Voigt {
-    let nu = orders::MATERIAL.poisson;
+    let nu = orders::MATERIAL.hooke().poisson;
     [-nu * x[0], x[0], -nu * x[0], 0.0, 0.0, 0.0]
 }
 
@@ -109,9 +109,9 @@ fn the_estimate_is_near_the_error_in_bending_and_zero_where_elements_are_exact()
     }
 }
 
-fn parts<'a>(setup: &'a Setup) -> Vec<Part<'a>> {
-    let part = |(own, subdomain)| Part { subdomain, material: setup.material(own), history: &[] };
-    setup.subdomains().iter().enumerate().map(part).collect()
+fn regions<'a>(setup: &'a Setup) -> Vec<Region<'a>> {
+    let region = |(own, subdomain)| Region::virgin(subdomain, setup.material(own));
+    setup.subdomains().iter().enumerate().map(region).collect()
 }
 
 /// The estimate of a smooth displacement: squares of all elements, by body and place.
@@ -119,7 +119,7 @@ fn of_waves(setup: &Setup) -> Vec<(u64, f64)> {
     let wave = |[x, y, z]: [f64; 3]| [(x * y).sin(), (0.7 * z + x).cos(), (y - z).sin() * x];
     let u = setup.subdomains().iter().map(|s| s.points.iter().flat_map(|&p| wave(p)).collect()).collect();
     let sums = NodeSums::new(setup.comm, &setup.discrete.decomposition);
-    let Estimate { errors, .. } = estimate(&sums, &parts(setup), &u);
+    let Estimate { errors, .. } = estimate(&sums, &regions(setup), &u);
     let name = |subdomain: &Subdomain, nodes: &[u32]| {
         let mut nodes: Vec<u64> = nodes.iter().map(|&n| subdomain.nodes[n as usize]).collect();
         nodes.sort_unstable();

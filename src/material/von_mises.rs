@@ -23,30 +23,62 @@
 //! step dissipates or stores by hardening, not what former steps did. The step is exact for radial paths from the
 //! committed state. No rate dependence, no plane stress.
 
-use super::Material;
+use serde::{Deserialize, Serialize};
+
+use super::Hooke;
+use super::law::{BadParameter, Law, Response, Variable, Variables};
 use crate::tensor::{Tangent, Voigt, contract, deviator, stress_norm, trace};
 
-/// What a material point remembers between load steps; zero is the virgin state. The back stress follows from the
-/// plastic strain.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct History {
+/// Parameters, as a scene has them; stresses and moduli in one unit.
+///
+/// The yield condition is `sigma_eq <= yield_stress + hardening * kappa` with the equivalent plastic strain `kappa`
+/// (de Souza Neto, Peric and Owen 2008), where `sigma_eq` is of the stress less the back stress, and the back stress is
+/// `2/3 kinematic_hardening` times the plastic strain (Prager). So the sum of both hardenings is the slope of stress over
+/// *plastic* strain in a uniaxial test.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VonMises {
+    /// Young's modulus E > 0.
+    pub young: f64,
+    /// Poisson's ratio, -1 < nu < 1/2.
+    pub poisson: f64,
+    /// Initial yield stress in uniaxial tension, > 0; `None` is elastic for ever.
+    pub yield_stress: Option<f64>,
+    /// Slope H >= 0 of yield stress over accumulated plastic strain; 0 is perfect plasticity.
+    #[serde(default)]
+    pub hardening: f64,
+    /// Slope C >= 0 of the back stress over plastic strain, both uniaxial (Prager's rule).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub kinematic_hardening: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// What a point remembers; zero is the virgin state. The back stress follows from the plastic strain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlasticState {
     /// Plastic strain, engineering shears, traceless.
     pub plastic_strain: Voigt,
     /// Accumulated plastic strain, the integral of sqrt(2/3) |d plastic_strain|.
     pub kappa: f64,
 }
 
-/// What a material point answers to a strain.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Response {
-    /// Stress, the derivative of `energy` by the strain.
-    pub stress: Voigt,
-    /// One-step potential Psi, energy per volume.
-    pub energy: f64,
-    /// Whether the trial stress is outside the yield surface, by more than round-off.
-    pub plastic: bool,
-    /// Accumulated plastic strain at the end of the step.
-    pub kappa: f64,
+impl Variables for PlasticState {
+    const VIRGIN: Self = Self { plastic_strain: [0.0; 6], kappa: 0.0 };
+
+    fn variables() -> impl Iterator<Item = Variable> {
+        [("plastic_strain", 6), ("kappa", 1)].into_iter().map(|(name, components)| Variable { name, components })
+    }
+
+    fn values(&self, variable: usize) -> &[f64] {
+        if variable == 0 { &self.plastic_strain } else { std::slice::from_ref(&self.kappa) }
+    }
+
+    fn values_mut(&mut self, variable: usize) -> &mut [f64] {
+        if variable == 0 { &mut self.plastic_strain } else { std::slice::from_mut(&mut self.kappa) }
+    }
 }
 
 /// An excess below this share of the yield stress is round-off: the tangent of a point that flowed before and is not
@@ -78,11 +110,12 @@ fn equivalent(deviator: &Voigt) -> f64 {
 }
 
 impl Trial {
-    fn new(material: &Material, strain: &Voigt, committed: &History) -> Self {
-        let (bulk, mu) = (material.bulk_modulus(), material.shear_modulus());
-        let elastic: Voigt = std::array::from_fn(|i| strain[i] - committed.plastic_strain[i]);
-        let volume = trace(&elastic);
-        let s = material.deviatoric_stress(&elastic);
+    fn new(material: &VonMises, strain: &Voigt, committed: &PlasticState) -> Self {
+        let elastic = material.hooke();
+        let (bulk, mu) = (elastic.bulk_modulus(), elastic.shear_modulus());
+        let strain: Voigt = std::array::from_fn(|i| strain[i] - committed.plastic_strain[i]);
+        let volume = trace(&strain);
+        let s = material.deviatoric_stress(&strain);
         let back = material.back_stress(committed);
         let relative: Voigt = std::array::from_fn(|i| s[i] - back[i]);
         let q = equivalent(&relative);
@@ -121,28 +154,73 @@ fn contract_stresses(a: &Voigt, b: &Voigt) -> f64 {
     contract(a, b) + (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
 }
 
-impl Material {
+impl VonMises {
+    /// A material that never yields.
+    pub const fn elastic(young: f64, poisson: f64) -> Self {
+        Self { young, poisson, yield_stress: None, hardening: 0.0, kinematic_hardening: 0.0 }
+    }
+
     /// 3 mu + H + C: what the equivalent stress falls by, beyond the yield surface, for a unit of plastic strain.
     fn plastic_modulus(&self) -> f64 {
-        3.0 * self.shear_modulus() + self.hardening + self.kinematic_hardening
+        3.0 * self.hooke().shear_modulus() + self.hardening + self.kinematic_hardening
     }
 
     /// 2 mu dev strain, the deviator of the stress of an elastic strain.
     #[inline]
     fn deviatoric_stress(&self, strain: &Voigt) -> Voigt {
-        let (mu, d) = (self.shear_modulus(), deviator(strain));
+        let (mu, d) = (self.hooke().shear_modulus(), deviator(strain));
         [2.0 * mu * d[0], 2.0 * mu * d[1], 2.0 * mu * d[2], mu * d[3], mu * d[4], mu * d[5]]
     }
 
     /// The back stress 2/3 C plastic_strain, a deviator.
-    pub fn back_stress(&self, committed: &History) -> Voigt {
+    pub fn back_stress(&self, committed: &PlasticState) -> Voigt {
         let (normal, shear) = (2.0 / 3.0 * self.kinematic_hardening, 1.0 / 3.0 * self.kinematic_hardening);
         let [xx, yy, zz, xy, yz, zx] = committed.plastic_strain;
         [normal * xx, normal * yy, normal * zz, shear * xy, shear * yz, shear * zx]
     }
+}
 
-    /// Stress, potential and plasticity at `strain`, one step away from `committed`.
-    pub fn respond(&self, strain: &Voigt, committed: &History) -> Response {
+impl Law for VonMises {
+    type State = PlasticState;
+
+    fn check(&self) -> Result<(), BadParameter> {
+        let Self { young, poisson, yield_stress, hardening, kinematic_hardening } = *self;
+        let require =
+            |holds: bool, name, value, rule| if holds { Ok(()) } else { Err(BadParameter { name, value, rule }) };
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        require(positive(young), "young", young, "must be positive and finite")?;
+        let rule = "must be above -1 and below 0.5, where the material would be incompressible";
+        require(poisson > -1.0 && poisson < 0.5, "poisson", poisson, rule)?;
+        if let Some(stress) = yield_stress {
+            let rule = "must be positive and finite; leave it out for an elastic material";
+            require(positive(stress), "yield_stress", stress, rule)?;
+        }
+        let rule = "must be finite and not negative (0 is perfect plasticity): softening has no unique solution";
+        let allowed = |slope: f64| slope.is_finite() && slope >= 0.0;
+        require(allowed(hardening), "hardening", hardening, rule)?;
+        let rule = "must be finite and not negative";
+        require(allowed(kinematic_hardening), "kinematic_hardening", kinematic_hardening, rule)?;
+        for (name, slope) in [("hardening", hardening), ("kinematic_hardening", kinematic_hardening)] {
+            let rule = "nothing hardens that does not yield: add yield_stress, or remove it";
+            require(yield_stress.is_some() || slope == 0.0, name, slope, rule)?;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn hooke(&self) -> Hooke {
+        Hooke { young: self.young, poisson: self.poisson }
+    }
+
+    fn yields(&self) -> bool {
+        self.yield_stress.is_some()
+    }
+
+    fn has_limit(&self) -> bool {
+        self.yields() && self.hardening + self.kinematic_hardening == 0.0
+    }
+
+    fn respond(&self, strain: &Voigt, committed: &PlasticState) -> Response {
         let trial = Trial::new(self, strain, committed);
         let mut stress: Voigt = std::array::from_fn(|i| trial.shrink * trial.relative[i] + trial.back[i]);
         stress[..3].iter_mut().for_each(|s| *s += trial.pressure);
@@ -150,25 +228,18 @@ impl Material {
             stress,
             energy: trial.energy - 0.5 * trial.excess * trial.step,
             plastic: trial.plastic(),
-            kappa: committed.kappa + trial.step,
+            equivalent_plastic_strain: committed.kappa + trial.step,
         }
     }
 
-    /// The consistent tangent d stress / d strain of the same step: symmetric, at most C_e, at least
-    /// (H + C) / (3 mu + H + C) C_e. In an elastic step it is [`Material::elastic_tangent`] to the last bit.
-    pub fn tangent(&self, strain: &Voigt, committed: &History) -> Tangent {
-        self.stiffness(strain, committed, None)
-    }
-
-    /// The tangent with the symmetric part of W x N in place of N x N, for a direction of `flow` W in the unit ball of deviators;
-    /// without one it is N. Symmetric, at least (H + C) / (3 mu + H + C) C_e, at most 2 C_e, and C_e where W : N = |W|. See
-    /// [`crate::assembly::flow`].
-    pub fn stiffness(&self, strain: &Voigt, committed: &History, flow: Option<&Voigt>) -> Tangent {
+    /// At least (H + C) / (3 mu + H + C) C_e. With a direction W in the unit ball of deviators, the symmetric part of W x N stands
+    /// in place of N x N; the tangent is at most 2 C_e then, and C_e where W : N = |W|.
+    fn stiffness(&self, strain: &Voigt, committed: &PlasticState, flow: Option<&Voigt>) -> Tangent {
         let trial = Trial::new(self, strain, committed);
         if !trial.plastic() {
-            return self.elastic_tangent();
+            return self.hooke().tangent();
         }
-        let (bulk, mu) = (self.bulk_modulus(), self.shear_modulus());
+        let (bulk, mu) = (self.hooke().bulk_modulus(), self.hooke().shear_modulus());
         let shear = mu * trial.shrink;
         let q = trial.equivalent;
         let normal = trial.relative.map(|s| 1.5f64.sqrt() * s / q);
@@ -188,12 +259,12 @@ impl Material {
         c
     }
 
-    /// The direction of flow that the equation `|xi| W = xi`, linear around `strain` and `flow`, gives after a `change` of the
-    /// strain by a step of this `length`, moved into the unit ball. Where `strain` is elastic it is N after the change.
-    pub fn flow(
+    /// The direction that the equation `|xi| W = xi`, linear around `strain` and `flow`, gives after the change, moved into the unit
+    /// ball. Where `strain` is elastic it is N after the change.
+    fn flow(
         &self,
         strain: &Voigt,
-        committed: &History,
+        committed: &PlasticState,
         flow: Option<&Voigt>,
         (change, length): (&Voigt, f64),
     ) -> Voigt {
@@ -214,13 +285,11 @@ impl Material {
         next.map(|w| w / size)
     }
 
-    /// Psi(strain + change) - Psi(strain) - sigma(strain) : change, energy per volume: how far Psi is above its tangent. As
-    /// accurate for small changes as for large ones.
-    pub fn divergence(&self, strain: &Voigt, change: &Voigt, committed: &History) -> f64 {
+    fn divergence(&self, strain: &Voigt, change: &Voigt, committed: &PlasticState) -> f64 {
         let trial = Trial::new(self, strain, committed);
-        let (mu, volume, s) = (self.shear_modulus(), trace(change), self.deviatoric_stress(change));
+        let (mu, volume, s) = (self.hooke().shear_modulus(), trace(change), self.deviatoric_stress(change));
         let square = equivalent(&s).powi(2);
-        let elastic = 0.5 * self.bulk_modulus() * volume * volume + square / (6.0 * mu);
+        let elastic = 0.5 * self.hooke().bulk_modulus() * volume * volume + square / (6.0 * mu);
         let moved: Voigt = std::array::from_fn(|i| trial.relative[i] + s[i]);
         let (before, after) = (trial.equivalent, equivalent(&moved));
         let excess = (after - trial.yield_stress).max(0.0);
@@ -239,23 +308,22 @@ impl Material {
         (elastic - softer / (2.0 * self.plastic_modulus())).max(0.0)
     }
 
-    /// (H + C) / (3 mu + H + C): the least that tangents are of the elastic stiffness; 1 for an elastic material.
-    pub fn least_tangent(&self) -> f64 {
+    /// (H + C) / (3 mu + H + C).
+    fn least_tangent(&self) -> f64 {
         match self.yield_stress {
             Some(_) => (self.hardening + self.kinematic_hardening) / self.plastic_modulus(),
             None => 1.0,
         }
     }
 
-    /// The history at the end of the step, to be committed once the load step has converged.
-    pub fn commit(&self, strain: &Voigt, committed: &History) -> History {
+    fn commit(&self, strain: &Voigt, committed: &PlasticState) -> PlasticState {
         let trial = Trial::new(self, strain, committed);
         if trial.step == 0.0 {
             return *committed;
         }
         let flow = 1.5 * trial.step / trial.equivalent;
         let factor = [flow, flow, flow, 2.0 * flow, 2.0 * flow, 2.0 * flow];
-        History {
+        PlasticState {
             plastic_strain: std::array::from_fn(|i| committed.plastic_strain[i] + factor[i] * trial.relative[i]),
             kappa: committed.kappa + trial.step,
         }

@@ -23,7 +23,7 @@ pub struct Neighbours {
 impl Neighbours {
     /// Pairs up the faces, at most 2^32, of elements on nodes `0..nodes`.
     pub fn new(nodes: usize, elements: &Elements) -> Self {
-        match elements.kind().corners_of_face() {
+        match elements.kind().cell().corners_of_face() {
             3 => Self::pair::<3>(nodes, elements),
             _ => Self::pair::<4>(nodes, elements),
         }

@@ -14,7 +14,7 @@ use super::brick::{HEXAHEDRON, indices};
 use super::faces::Neighbours;
 use super::solid::NamedSurface;
 use super::{Elements, SolidMesh, split};
-use crate::element::{Kind, tet10};
+use crate::element::{Cell, Kind};
 
 /// A body.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,13 +58,13 @@ impl Mapped {
                 let corner = |v: usize| std::array::from_fn(|a| 2 * (cell[a] + (v >> a & 1)));
                 let corners = HEXAHEDRON.map(|v| nodes.number(self.key(block, corner(v))));
                 cells += 1;
-                match kind {
-                    Kind::Hex8 => elements.extend(corners),
-                    Kind::Tet4 => split::tetrahedra(&corners, |tet| elements.extend(tet)),
-                    Kind::Tet10 => split::tetrahedra(&corners, |tet| {
-                        elements.extend(tet);
-                        elements.extend(tet10::EDGES.map(|(a, b)| nodes.middle(tet[a], tet[b])));
-                    }),
+                let mut add = |corners: &[u32]| {
+                    elements.extend(corners);
+                    elements.extend(kind.middles().iter().map(|&(a, b)| nodes.middle(corners[a], corners[b])));
+                };
+                match kind.cell() {
+                    Cell::Hexahedron => add(&corners),
+                    Cell::Tetrahedron => split::tetrahedra(&corners, |tet| add(&tet)),
                 }
             }
         }
@@ -220,7 +220,7 @@ mod tests {
                 let mesh = body.mesh(kind);
                 let quality = Quality::of(&mesh);
                 assert!(quality.is_sound() && quality.worst_shape > 0.05, "{kind:?} {quality:?}");
-                assert_eq!(mesh.elements.len() as u64, kind.per_cell() * mesh.cells);
+                assert_eq!(mesh.elements.len() as u64, kind.cell().per_hexahedron() * mesh.cells);
                 let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
                 assert_eq!(neighbours.overlapping, 0);
                 let named: usize = mesh.surfaces.iter().map(|s| s.faces.len()).sum();

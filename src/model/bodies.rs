@@ -69,15 +69,14 @@ impl Meshes {
                 Shape::Mesh(Counts { nodes, cells, elements })
             }
         };
-        let bodies =
-            number_bodies(scene.body.values().map(|body| (kind(body.element), shape(body), materials(scene, body))));
+        let bodies = number_bodies(scene.body.values().map(|body| (body.element, shape(body), materials(scene, body))));
         Ok(Self { bodies, solids, warnings: texts[2..].to_vec() })
     }
 }
 
 /// The bodies of a scene of bricks alone.
 pub fn bricks(scene: &Scene) -> Option<Vec<BodyMesh>> {
-    let shape = |body: &scene::Body| Some((kind(body.element), brick(body.brick()?), materials(scene, body)));
+    let shape = |body: &scene::Body| Some((body.element, brick(body.brick()?), materials(scene, body)));
     let shapes = scene.body.values().map(shape);
     shapes.collect::<Option<Vec<_>>>().map(number_bodies)
 }
@@ -85,17 +84,9 @@ pub fn bricks(scene: &Scene) -> Option<Vec<BodyMesh>> {
 /// The bodies of a scene whose meshes have these sizes, body by body.
 pub(crate) fn of_counts(scene: &Scene, counts: impl Iterator<Item = Counts>) -> Vec<BodyMesh> {
     let shape = |(body, counts): (&scene::Body, Counts)| {
-        (kind(body.element), body.brick().map_or(Shape::Mesh(counts), brick), materials(scene, body))
+        (body.element, body.brick().map_or(Shape::Mesh(counts), brick), materials(scene, body))
     };
     number_bodies(scene.body.values().zip(counts).map(shape))
-}
-
-pub(crate) fn kind(element: scene::Element) -> Kind {
-    match element {
-        scene::Element::Tet4 => Kind::Tet4,
-        scene::Element::Tet10 => Kind::Tet10,
-        scene::Element::Hex8 => Kind::Hex8,
-    }
 }
 
 fn brick(b: &scene::Brick) -> Shape {
@@ -132,7 +123,7 @@ fn read(scene: &Scene) -> Result<Found, MeshError> {
                 index,
                 name,
                 gmsh,
-                kind: kind(body.element),
+                kind: body.element,
             });
         }
     }
@@ -160,7 +151,7 @@ fn read(scene: &Scene) -> Result<Found, MeshError> {
     }
     for (index, (name, body)) in scene.body.iter().enumerate() {
         if let Some(mapped) = mapped(&body.shape) {
-            let mesh = mapped.mesh(kind(body.element));
+            let mesh = mapped.mesh(body.element);
             found.warnings.extend(check(scene, name, &mesh)?);
             found.solids.insert(index, mesh);
         }
@@ -276,7 +267,7 @@ fn held(scene: &Scene, body: &str, mesh: &SolidMesh, pieces: usize) -> Vec<(Stri
 fn count(scene: &Scene, found: &Found) -> Result<(), MeshError> {
     let Method::Metis { subdomains: Some(subdomains) } = scene.decomposition.method else { return Ok(()) };
     let bricks =
-        scene.body.values().filter_map(|b| Some(b.brick()?.cell_count() * kind(b.element).per_cell() as usize));
+        scene.body.values().filter_map(|b| Some(b.brick()?.cell_count() * b.element.cell().per_hexahedron() as usize));
     let elements =
         found.solids.values().map(|mesh| mesh.elements.len()).chain(bricks).fold(0_usize, usize::saturating_add);
     if subdomains <= elements {

@@ -10,7 +10,7 @@ use crate::comm::Comm;
 use crate::constraint::{Constraints, Support};
 use crate::contact::{ContactPair, MasterNode};
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
-use crate::material::Material;
+use crate::material::{Law, Material};
 use crate::mesh::Face;
 use crate::monitor::timing::peak_rss_mb;
 use crate::record::counts::ContactRow;
@@ -80,7 +80,7 @@ pub fn discretise_expecting(
     comm: &dyn Comm,
 ) -> Result<Discrete, ModelError> {
     let Meshes { bodies, solids, mut warnings } = Meshes::new(scene, comm)?;
-    let materials: Vec<Material> = scene.material.values().map(material).collect();
+    let materials: Vec<Material> = scene.material.values().copied().collect();
     let number =
         |name: &str| scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies");
     let surface = |name: &SurfaceName| {
@@ -125,7 +125,7 @@ pub fn discretise_expecting(
     };
     let loads = scene.load.values().map(load).collect();
     let contacts: Vec<String> = scene.contact.keys().cloned().collect();
-    let young: Vec<f64> = decomposition.subdomains.iter().map(|s| materials[s.material].young).collect();
+    let young: Vec<f64> = decomposition.subdomains.iter().map(|s| materials[s.material].hooke().young).collect();
     let stiffness = comm.all_gather(&young, &decomposition.shares.counts(1));
     let given = conditions::Given {
         decomposition: &decomposition,
@@ -195,9 +195,4 @@ pub fn can_be_cut(scene: &Scene, bodies: &[BodyMesh], cut: Cut) -> Result<(), Me
         ))
     };
     found.map_or(Ok(()), |body| Err(refusal(body)))
-}
-
-fn material(m: &scene::Material) -> Material {
-    let scene::Material { young, poisson, yield_stress, hardening, kinematic_hardening } = *m;
-    Material { young, poisson, yield_stress, hardening, kinematic_hardening }
 }

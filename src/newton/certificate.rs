@@ -39,6 +39,7 @@ use crate::assembly::internal;
 use crate::feti::Torn;
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::recover;
+use crate::material::Law;
 use crate::monitor::timing::Timer;
 use crate::vector::dot;
 
@@ -94,13 +95,11 @@ impl Trial {
     fn terms(&self, problem: &TornProblem, correction: &Torn, is_at_u: bool) -> Vec<f64> {
         let Self { v, change, rho } = self;
         let mut terms = Vec::with_capacity(4 * v.len());
-        for (own, subdomain) in problem.subdomains.iter().enumerate() {
-            let (material, history) = (&problem.materials[own], problem.committed.history(own));
-            let moved =
-                if is_at_u { 0.0 } else { internal::divergence(subdomain, material, history, &v[own], &change[own]) };
+        for (own, region) in problem.regions().iter().enumerate() {
+            let moved = if is_at_u { 0.0 } else { internal::divergence(region, &v[own], &change[own]) };
             let worked = -dot(&rho[own], &change[own]);
             let square = (1.0 + FACTORS) * dot(&rho[own], &correction[own]);
-            let weighted = if square > 0.0 { square / material.least_tangent() } else { 0.0 };
+            let weighted = if square > 0.0 { square / region.material.least_tangent() } else { 0.0 };
             terms.extend([moved, worked, square, weighted]);
         }
         terms
@@ -109,12 +108,11 @@ impl Trial {
     /// Goes on to `v + correction`.
     fn advance(&mut self, problem: &TornProblem, lambda: &[f64], correction: &Torn) {
         let Self { v, change, rho } = self;
-        for (own, subdomain) in problem.subdomains.iter().enumerate() {
+        for (own, region) in problem.regions().iter().enumerate() {
             v[own].iter_mut().zip(&correction[own]).for_each(|(v, c)| *v += c);
             change[own].iter_mut().zip(&correction[own]).for_each(|(d, c)| *d -= c);
-            let (material, history) = (&problem.materials[own], problem.committed.history(own));
             let mut forces = vec![0.0; v[own].len()];
-            internal::add_forces(subdomain, material, history, &v[own], &mut forces);
+            internal::add_forces(region, &v[own], &mut forces);
             rho[own].clone_from(&problem.loads[own]);
             rho[own].iter_mut().zip(forces).for_each(|(r, f)| *r -= f);
         }

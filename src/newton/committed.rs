@@ -54,16 +54,14 @@ impl TornProblem<'_> {
         let sizes = Sizes { elastic_norm: self.elastic_norm(u), ..self.measure(u, state, lambda).1 };
         self.committed.sizes = self.committed.sizes.larger(sizes);
         self.committed.histories.resize_with(u.len(), Vec::new);
-        for (own, history) in
-            self.committed.histories.iter_mut().enumerate().filter(|(own, _)| state.yielding[*own] > 0)
-        {
-            internal::commit(&self.subdomains[own], &self.materials[own], &u[own], history);
+        for own in (0..u.len()).filter(|&own| state.yielding[own] > 0) {
+            self.committed.histories[own] = internal::commit(&self.region(own), &u[own]);
         }
     }
 
     /// `|u|_e`. One collective.
     fn elastic_norm(&self, u: &Torn) -> f64 {
-        let square = |own: usize| internal::elastic_squares(&self.subdomains[own], &self.materials[own], [&u[own]])[0];
+        let square = |own: usize| internal::elastic_squares(&self.region(own), [&u[own]])[0];
         let partial: Vec<f64> = (0..u.len()).map(square).collect();
         self.space.sum(&partial, 1)[0].sqrt()
     }

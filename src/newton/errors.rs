@@ -3,7 +3,7 @@
 
 use super::StepSolver;
 use super::problem::{SIGNIFICANT, State, TornProblem};
-use crate::estimate::{self, Estimate, Part};
+use crate::estimate::{self, Estimate};
 use crate::feti::Torn;
 use crate::monitor::timing::Timer;
 
@@ -23,15 +23,6 @@ pub struct Errors {
 }
 
 impl TornProblem<'_> {
-    fn parts(&self) -> Vec<Part<'_>> {
-        let part = |own: usize| Part {
-            subdomain: &self.subdomains[own],
-            material: &self.materials[own],
-            history: self.committed.history(own),
-        };
-        (0..self.subdomains.len()).map(part).collect()
-    }
-
     /// What errors are relative to, given the sum of squares of the stress.
     fn stress_size(&self, squares: f64, state: &State) -> f64 {
         squares.sqrt().max(SIGNIFICANT * state.terms.energy.sqrt())
@@ -49,7 +40,7 @@ impl StepSolver<'_> {
     ) -> Errors {
         let certificate = self.certify(problem, (u, state), lambda, timer);
         let Estimate { mut errors, stresses } =
-            timer.time("error estimate", || estimate::estimate(problem.sums, &problem.parts(), u));
+            timer.time("error estimate", || estimate::estimate(problem.sums, &problem.regions(), u));
         let partial: Vec<f64> =
             errors.iter().zip(stresses).flat_map(|(errors, stress)| [errors.iter().sum(), stress]).collect();
         let sum = problem.space.sum(&partial, 2);

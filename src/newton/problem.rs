@@ -14,7 +14,7 @@ use crate::feti::dual::coupling::Coupling;
 use crate::feti::dual::gather::Gather;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::RigidModes;
-use crate::material::Material;
+use crate::material::{Law, Material};
 use crate::model::Discrete;
 use crate::model::stages::Conditions;
 
@@ -80,7 +80,7 @@ impl<'a> TornProblem<'a> {
     ) -> Self {
         let Discrete { materials, constraints, bodies, .. } = discrete;
         let subdomains = &discrete.decomposition.subdomains[..];
-        let yields = |&material: &usize| materials[material].yield_stress.is_some();
+        let yields = |&material: &usize| materials[material].yields();
         Self {
             subdomains,
             materials: subdomains.iter().map(|s| materials[s.material]).collect(),
@@ -120,9 +120,8 @@ impl TornProblem<'_> {
         let mut forces = self.gather.zeros();
         let mut partial = Vec::with_capacity(5 * u.len());
         let mut yielding = Vec::with_capacity(u.len());
-        for (own, subdomain) in self.subdomains.iter().enumerate() {
-            let history = self.committed.history(own);
-            let found = internal::add_forces(subdomain, &self.materials[own], history, &u[own], &mut forces[own]);
+        for (own, region) in self.regions().iter().enumerate() {
+            let found = internal::add_forces(region, &u[own], &mut forces[own]);
             let Terms { energy, force_squares } = found.terms;
             let work = dot(&self.loads[own], &u[own]);
             yielding.push(found.plastic);
@@ -160,9 +159,9 @@ impl TornProblem<'_> {
     /// After an unloading the largest committed displacement is what the change is compared with.
     pub fn relative_change(&self, u: &Torn, v: &Torn, terms: &Terms) -> f64 {
         let mut partial = Vec::with_capacity(3 * u.len());
-        for (own, subdomain) in self.subdomains.iter().enumerate() {
+        for (own, region) in self.regions().iter().enumerate() {
             let difference: Vec<f64> = v[own].iter().zip(&u[own]).map(|(v, u)| v - u).collect();
-            partial.extend(internal::elastic_squares(subdomain, &self.materials[own], [&difference, &u[own], &v[own]]));
+            partial.extend(internal::elastic_squares(region, [&difference, &u[own], &v[own]]));
         }
         let norms: Vec<f64> = self.space.sum(&partial, 3).into_iter().map(f64::sqrt).collect();
         let size = (norms[1] + norms[2]).max(SIGNIFICANT * terms.energy.sqrt()).max(self.committed.sizes.elastic_norm);

@@ -161,9 +161,7 @@ impl<'a> StepSolver<'a> {
                 continue;
             }
             let change: Vec<f64> = next[own].iter().zip(&u[own]).map(|(next, u)| next - u).collect();
-            let (subdomain, material) = (&problem.subdomains[own], &problem.materials[own]);
-            let (history, step) = (problem.committed.history(own), (&change[..], length));
-            *flow = Arc::new(flow::follow(subdomain, material, history, flow, &u[own], step));
+            *flow = Arc::new(flow::follow(&problem.region(own), flow, &u[own], (&change, length)));
         }
     }
 

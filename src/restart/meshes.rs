@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Counts;
+use crate::element::Kind;
 use crate::model::discrete::Discrete;
-use crate::scene::{Element, Scene};
+use crate::scene::Scene;
 
 /// The mesh of a body.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -13,7 +14,7 @@ pub struct MeshOf {
     /// Name of the body.
     pub body: String,
     /// Its element.
-    pub element: Element,
+    pub element: Kind,
     /// Number of its first node among those of all bodies.
     pub first_node: u64,
     /// How many nodes it has.

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::decomposition::Subdomain;
-use crate::material::History;
+use crate::material::{History, Variables, history};
 use crate::results::hdf5::{Number, SharedFile};
 
 /// Rows that are read at once.
@@ -189,15 +189,12 @@ impl<'a> Places<'a> {
         rows: &Wanted<(usize, usize)>,
         group: &str,
     ) -> Result<Vec<Vec<History>>, String> {
-        let strains = rows.read::<f64>(file, &format!("{group}/plastic_strain"), 0)?;
-        let kappas = rows.read::<f64>(file, &format!("{group}/kappa"), 0)?;
-        let found = strains.as_chunks::<6>().0.iter().zip(kappas);
+        let found = history::from_arrays(|name| rows.read::<f64>(file, &format!("{group}/{name}"), 0))?;
         let mut histories = vec![Vec::new(); self.subdomains.len()];
-        for (&(k, point), (&plastic_strain, kappa)) in rows.places.iter().zip(found) {
-            let history = History { plastic_strain, kappa };
-            if history != History::default() {
+        for (&(k, point), history) in rows.places.iter().zip(found) {
+            if history != History::VIRGIN {
                 let elements = &self.subdomains[k].elements;
-                histories[k].resize(elements.kind().points() * elements.len(), History::default());
+                histories[k].resize(elements.kind().points() * elements.len(), History::VIRGIN);
                 histories[k][point] = history;
             }
         }

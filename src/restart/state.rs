@@ -17,7 +17,7 @@ use super::places::{Places, Wanted, key};
 use crate::comm::Comm;
 use crate::comm::agree::{agree, on_root};
 use crate::feti::Torn;
-use crate::material::History;
+use crate::material::{History, Variables, history};
 use crate::model::discrete::Discrete;
 use crate::newton::TornProblem;
 use crate::newton::committed::{Committed, Sizes};
@@ -35,26 +35,23 @@ struct Description {
 
 /// The state that a problem has committed.
 pub fn pack(problem: &TornProblem, meshes: Vec<MeshOf>) -> State {
-    let (mut nodes, mut points, mut strains, mut kappas) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut nodes, mut points, mut histories) = (Vec::new(), Vec::new(), Vec::new());
     for (own, subdomain) in problem.subdomains.iter().enumerate() {
         let of_element = subdomain.elements.kind().points();
         for (index, history) in problem.committed.history(own).iter().enumerate() {
-            if *history != History::default() {
+            if *history != History::VIRGIN {
                 let element = subdomain.elements.get(index / of_element);
                 nodes.extend(key(element, &subdomain.nodes));
                 points.push((index % of_element) as i64);
-                strains.extend(history.plastic_strain);
-                kappas.push(history.kappa);
+                histories.push(history);
             }
         }
     }
     let description = Description { meshes, sizes: problem.committed.sizes };
-    let arrays = vec![
-        Field::of("nodes", 4, Values::Integer(nodes)),
-        Field::of("point", 1, Values::Integer(points)),
-        Field::of("plastic_strain", 6, Values::Real(strains)),
-        Field::of("kappa", 1, Values::Real(kappas)),
-    ];
+    let mut arrays =
+        vec![Field::of("nodes", 4, Values::Integer(nodes)), Field::of("point", 1, Values::Integer(points))];
+    let variables = history::arrays(histories.into_iter());
+    arrays.extend(variables.map(|(of, values)| Field::of(of.name, of.components, Values::Real(values))));
     State { description: serde_json::to_string(&description).expect("numbers and names can be written"), arrays }
 }
 

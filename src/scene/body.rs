@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::mapped::{Cylinder, Grid, Sphere};
 use super::volumes::{Materials, Volumes};
+use crate::element::Kind;
 
 /// One body of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,7 +16,7 @@ pub struct Body {
     /// What it is made of.
     pub material: Materials,
     /// Finite element of its mesh.
-    pub element: Element,
+    pub element: Kind,
     /// Shape and mesh.
     pub shape: Shape,
 }
@@ -52,7 +53,7 @@ impl Body {
 #[serde(deny_unknown_fields)]
 struct Section {
     material: Materials,
-    element: Element,
+    element: Kind,
     brick: Option<Brick>,
     gmsh: Option<Gmsh>,
     sphere: Option<Sphere>,
@@ -138,37 +139,6 @@ pub struct Rotation {
     pub axis: [f64; 3],
     /// Angle in degrees, counter-clockwise seen against the axis.
     pub angle_deg: f64,
-}
-
-/// Finite elements to choose from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Element {
-    /// Linear tetrahedra, six to a hexahedral cell.
-    Tet4,
-    /// Quadratic tetrahedra, six to a hexahedral cell.
-    Tet10,
-    /// Trilinear hexahedra with mean dilatation.
-    Hex8,
-}
-
-impl Element {
-    /// As in scene files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Element::Tet4 => "tet4",
-            Element::Tet10 => "tet10",
-            Element::Hex8 => "hex8",
-        }
-    }
-
-    /// Elements that fill one hexahedral cell.
-    pub fn per_cell(self) -> usize {
-        match self {
-            Element::Tet4 | Element::Tet10 => 6,
-            Element::Hex8 => 1,
-        }
-    }
 }
 
 /// A box cut into equal hexahedral cells.

@@ -14,11 +14,11 @@ use super::held::Held;
 use super::initial::Initial;
 use super::load::Load;
 use super::mapped::{OF_CYLINDER, OF_SPHERE};
-use super::material::Material;
 use super::solver::Solver;
 use super::step::Step;
 use super::surface::{Face, Support, SurfaceName};
 use super::volumes;
+use crate::material::{BadParameter, Law, Material};
 
 pub(super) type Checked = Result<(), Fault>;
 
@@ -62,25 +62,12 @@ fn names<'a>(known: impl Iterator<Item = &'a String>) -> String {
 }
 
 fn material(key: &str, material: &Material) -> Checked {
-    let Material { young, poisson, yield_stress, hardening, kinematic_hardening } = *material;
-    let positive = |value: f64| value.is_finite() && value > 0.0;
-    require(positive(young), &format!("{key}.young"), young, "must be positive and finite")?;
-    let rule = "must be above -1 and below 0.5, where the material would be incompressible";
-    require(poisson > -1.0 && poisson < 0.5, &format!("{key}.poisson"), poisson, rule)?;
-    if let Some(stress) = yield_stress {
-        let rule = "must be positive and finite; leave it out for an elastic material";
-        require(positive(stress), &format!("{key}.yield_stress"), stress, rule)?;
-    }
-    let rule = "must be finite and not negative (0 is perfect plasticity): softening has no unique solution";
-    let allowed = |slope: f64| slope.is_finite() && slope >= 0.0;
-    require(allowed(hardening), &format!("{key}.hardening"), hardening, rule)?;
-    let rule = "must be finite and not negative";
-    require(allowed(kinematic_hardening), &format!("{key}.kinematic_hardening"), kinematic_hardening, rule)?;
-    for (name, slope) in [("hardening", hardening), ("kinematic_hardening", kinematic_hardening)] {
-        let rule = "nothing hardens that does not yield: add yield_stress, or remove it";
-        require(yield_stress.is_some() || slope == 0.0, &format!("{key}.{name}"), slope, rule)?;
-    }
-    Ok(())
+    let fault = |BadParameter { name, value, rule }| Fault {
+        key: format!("{key}.{name}"),
+        value: Some(format!("{value:?}")),
+        rule: rule.to_owned(),
+    };
+    material.check().map_err(fault)
 }
 
 fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
@@ -288,8 +275,11 @@ fn decomposition(scene: &Scene) -> Checked {
             let rule = format!("each material of each body needs at least one, which are {regions}");
             require(subdomains >= regions, key, subdomains, rule)?;
             // Elements of mesh files are counted when these are read.
-            let per_body: Option<Vec<usize>> =
-                scene.body.values().map(|b| Some(b.brick()?.cell_count() * b.element.per_cell())).collect();
+            let per_body: Option<Vec<usize>> = scene
+                .body
+                .values()
+                .map(|b| Some(b.brick()?.cell_count() * b.element.cell().per_hexahedron() as usize))
+                .collect();
             let Some(per_body) = per_body else { return Ok(()) };
             let elements = per_body.into_iter().fold(0_usize, usize::saturating_add);
             require(subdomains <= elements, key, subdomains, format!("there are only {elements} elements to share out"))

@@ -19,7 +19,6 @@ mod initial;
 pub mod library;
 mod load;
 mod mapped;
-mod material;
 mod overrides;
 mod read;
 mod solver;
@@ -32,7 +31,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-pub use body::{Axis, Body, Brick, Element, Gmsh, Rotation, Shape};
+use crate::material::{Law, Material};
+
+pub use body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
 pub use changes::changes;
 pub use contact::{Contact, Obstacle, Sides};
 pub use decomposition::{Decomposition, Method, PAPER_CELLS};
@@ -41,7 +42,6 @@ pub use held::Held;
 pub use initial::Initial;
 pub use load::Load;
 pub use mapped::{Cylinder, Grid, Sphere};
-pub use material::Material;
 pub use overrides::{recut, well_formed};
 pub use solver::{Expansion, Precision, Preconditioner, Qp, Solver};
 pub use step::Step;
@@ -168,7 +168,7 @@ impl Scene {
 
     /// Whether a material flows without hardening, so that there are loads without an equilibrium.
     pub fn has_limit_load(&self) -> bool {
-        self.material.values().any(|m| m.yield_stress.is_some() && m.hardening + m.kinematic_hardening == 0.0)
+        self.material.values().any(Law::has_limit)
     }
 
     /// Surfaces that supports, loads and contacts name, with repetitions.

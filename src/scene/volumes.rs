@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::body::{Body, Gmsh};
 use super::check::{Checked, known, require};
-use super::material::Material;
+use crate::material::Material;
 
 /// Physical volumes that make a body, by name, or by number where they have none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -15,6 +15,7 @@
 //! Constants are from runs of the benchmark on one rank, with each element, in boxes and by METIS: at level 2 the estimate is 0.75
 //! to 1.3 times what runs took. The paper's boxes at levels 1 to 4 on two ranks take 0.94 to 1.19 of it.
 
+use crate::material::Law;
 use crate::scene::{Precision, Preconditioner, Scene};
 
 /// Memory of a run, in MiB.
@@ -72,7 +73,7 @@ pub(super) struct Lengths {
 
 /// Numbers that a subdomain takes, which may be one of congruent boxes.
 pub(super) fn of_subdomain(scene: &Scene, Lengths { factor, matrix, unknowns }: Lengths, is_box: bool) -> f64 {
-    let is_elastic = usize::from(scene.material.values().all(|m| m.yield_stress.is_none()));
+    let is_elastic = usize::from(!scene.material.values().any(Law::yields));
     let (held, index) = if is_box { (SHARED[is_elastic], 1.5) } else { (1.0, 2.8) };
     let precision = if scene.solver.precision == Precision::Mixed { 0.5 } else { 1.0 };
     let whole = if unknowns > IN_DOUBLE { 1.0 } else { precision };

@@ -7,7 +7,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::Solved;
-use crate::assembly::internal;
+use crate::assembly::{Region, internal};
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::Kind;
 use crate::contact::ContactPair;
@@ -149,7 +149,7 @@ fn yielding<'a>(
     let mut found = HashSet::new();
     for (subdomain, u) in subdomains.iter().zip(u) {
         let (body, brick) = (subdomain.body, brick(&coarse_bodies[subdomain.body]));
-        for nodes in internal::yielding(subdomain, material(subdomain), &[], u) {
+        for nodes in internal::yielding(&Region::virgin(subdomain, material(subdomain)), u) {
             let sum = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>();
             let centre = |a: usize| sum(a) / nodes.len() as f64;
             let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);

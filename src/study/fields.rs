@@ -3,19 +3,9 @@
 use super::contact::{self, ContactState, Touching};
 use crate::assembly::internal;
 use crate::decomposition::Subdomain;
-use crate::element::Kind;
 use crate::feti::Torn;
 use crate::newton::{Iterate, Newton, TornProblem};
 use crate::results::piece::{Field, Piece};
-
-/// VTK's number of a kind of cell.
-fn vtk_type(kind: Kind) -> u8 {
-    match kind {
-        Kind::Tet4 => 10,
-        Kind::Tet10 => 24,
-        Kind::Hex8 => 12,
-    }
-}
 
 /// Mesh of a rank's subdomains, one behind the other, with the fields that never change.
 pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
@@ -28,7 +18,7 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
         for of_element in &subdomain.elements {
             piece.connectivity.extend(of_element.iter().map(|&n| first + u64::from(n)));
             piece.offsets.push(piece.connectivity.len() as u64);
-            piece.types.push(vtk_type(subdomain.elements.kind()));
+            piece.types.push(subdomain.elements.kind().vtk());
             subdomain_ids.push(subdomain.id as i64);
             bodies.push(subdomain.body as i64);
             materials.push(subdomain.material as i64);
@@ -68,8 +58,6 @@ pub fn record(piece: &mut Piece, newton: &Newton, touching: Touching, contact: &
 
 /// Von Mises stress and equivalent plastic strain of all elements, one increment from what is committed.
 fn element_states<'a>(problem: &'a TornProblem<'_>, u: &'a Torn) -> impl Iterator<Item = (f64, f64)> + use<'a> {
-    problem.subdomains.iter().zip(u).enumerate().flat_map(|(own, (subdomain, u))| {
-        let (material, history) = (&problem.materials[own], problem.committed.history(own));
-        internal::answers(subdomain, material, history, u).into_iter().map(|answer| (answer.von_mises, answer.kappa))
-    })
+    let answers = |(own, u): (usize, &Vec<f64>)| internal::answers(&problem.region(own), u);
+    u.iter().enumerate().flat_map(answers).map(|answer| (answer.von_mises, answer.equivalent_plastic_strain))
 }

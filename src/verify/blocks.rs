@@ -4,7 +4,7 @@ use super::run::{Run, pressure_error};
 use super::{Case, Demand, Error, PAPER, material_line};
 use crate::analytic::blocks::{Pressed, TwoBlocks};
 use crate::analytic::homogeneous::uniaxial;
-use crate::scene::Element;
+use crate::element::Kind;
 
 /// Two cubes of the paper's material.
 pub struct Blocks {
@@ -75,7 +75,7 @@ impl Case for Blocks {
         )
     }
 
-    fn levels(&self, _: Element) -> Vec<usize> {
+    fn levels(&self, _: Kind) -> Vec<usize> {
         vec![1, 2]
     }
 

@@ -4,12 +4,12 @@ use super::radial::{Radial, State};
 use super::run::Run;
 use super::{Case, Demand, Error, effectivity, material_line, orders};
 use crate::analytic::cylinder::{Cylinder, CylinderState};
-use crate::material::Material;
-use crate::scene::Element;
+use crate::element::Kind;
+use crate::material::VonMises;
 
 /// Of de Souza Neto, Peric and Owen, 7.5, in GPa.
-pub(super) const STEEL: Material =
-    Material { young: 210.0, poisson: 0.3, yield_stress: Some(0.24), hardening: 0.0, kinematic_hardening: 0.0 };
+pub(super) const STEEL: VonMises =
+    VonMises { young: 210.0, poisson: 0.3, yield_stress: Some(0.24), hardening: 0.0, kinematic_hardening: 0.0 };
 
 pub(super) const CYLINDER: Cylinder = Cylinder { inner: 100.0, outer: 200.0, material: STEEL };
 
@@ -74,11 +74,11 @@ impl Case for Pressed {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         match (element, self.increments) {
-            (Element::Tet10, 1) => vec![2, 4, 8],
+            (Kind::Tet10, 1) => vec![2, 4, 8],
             (_, 1) => vec![4, 8, 16],
-            (Element::Tet10, _) => vec![2, 4],
+            (Kind::Tet10, _) => vec![2, 4],
             _ => vec![4, 8],
         }
     }
@@ -92,7 +92,7 @@ impl Case for Pressed {
             |x, u| (x[0] * u[0] + x[1] * u[1]) / radius(x) / state.outer_displacement() - 1.0,
         );
         if self.increments > 1 {
-            let demand = if run.element() == Element::Tet4 { Demand::Shown } else { Demand::Finest(BIAS) };
+            let demand = if run.element() == Kind::Tet4 { Demand::Shown } else { Demand::Finest(BIAS) };
             return vec![Error::new("outer radius", at_outer, demand)];
         }
         let at = |_, r: f64| {

@@ -3,10 +3,10 @@
 use super::run::{Run, pressure_error};
 use super::{Case, Demand, Error, material_line};
 use crate::analytic::hertz::Hertz;
-use crate::material::Material;
-use crate::scene::Element;
+use crate::element::Kind;
+use crate::material::VonMises;
 
-const STEEL: Material = Material::elastic(210_000.0, 0.3);
+const STEEL: VonMises = VonMises::elastic(210_000.0, 0.3);
 const RADIUS: f64 = 100.0;
 /// Makes a circle of contact of radius one.
 const APPROACH: f64 = 0.01;
@@ -43,12 +43,12 @@ impl Case for Ball {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         // Quadratic ones converge, but take thousands of applications of F and more than a minute.
         match element {
-            Element::Tet10 => Vec::new(),
-            Element::Tet4 => vec![1, 2],
-            Element::Hex8 => vec![1],
+            Kind::Tet10 => Vec::new(),
+            Kind::Tet4 => vec![1, 2],
+            Kind::Hex8 => vec![1],
         }
     }
 

@@ -3,7 +3,7 @@
 use super::run::Run;
 use super::{Case, Demand, Error, PAPER, material_line};
 use crate::analytic::homogeneous;
-use crate::scene::Element;
+use crate::element::Kind;
 use crate::tensor::{Voigt, von_mises};
 
 /// A state of the unit cube of the paper's material, in one step.
@@ -114,7 +114,7 @@ impl Case for Homogeneous {
         )
     }
 
-    fn levels(&self, _: Element) -> Vec<usize> {
+    fn levels(&self, _: Kind) -> Vec<usize> {
         vec![1, 2]
     }
 

@@ -9,8 +9,8 @@ use super::run::Run;
 use super::spheres::symmetry;
 use super::{Case, Demand, End, Error, material_line};
 use crate::analytic::hollow_sphere::HollowSphere;
-use crate::material::Material;
-use crate::scene::Element;
+use crate::element::Kind;
+use crate::material::VonMises;
 
 const SPHERE: HollowSphere = HollowSphere { inner: 100.0, outer: 200.0, material: STEEL };
 
@@ -50,8 +50,8 @@ const END: f64 = 1.3;
 /// What the better elements owe; what tetrahedra miss.
 const CLOSE: f64 = 0.02;
 
-fn close(element: Element) -> Demand {
-    if element == Element::Tet4 { Demand::Missed(CLOSE) } else { Demand::Finest(CLOSE) }
+fn close(element: Kind) -> Demand {
+    if element == Kind::Tet4 { Demand::Missed(CLOSE) } else { Demand::Finest(CLOSE) }
 }
 
 impl Case for Wall {
@@ -80,16 +80,16 @@ impl Case for Wall {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         match element {
-            Element::Tet10 => vec![2],
-            Element::Tet4 => vec![4],
-            Element::Hex8 => vec![2, 4],
+            Kind::Tet10 => vec![2],
+            Kind::Tet4 => vec![4],
+            Kind::Hex8 => vec![2, 4],
         }
     }
 
-    fn end(&self, element: Element) -> End {
-        if element == Element::Tet4 { End::Either } else { End::Early }
+    fn end(&self, element: Kind) -> End {
+        if element == Kind::Tet4 { End::Either } else { End::Early }
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {
@@ -104,8 +104,8 @@ impl Case for Wall {
 pub struct Footing;
 
 /// Of the ground, in kPa.
-const GROUND: Material =
-    Material { young: 1e7, poisson: 0.48, yield_stress: Some(848.7), hardening: 0.0, kinematic_hardening: 0.0 };
+const GROUND: VonMises =
+    VonMises { young: 1e7, poisson: 0.48, yield_stress: Some(848.7), hardening: 0.0, kinematic_hardening: 0.0 };
 
 /// Half the strip, and how thick a slice of it is.
 const HALF: f64 = 50.0;
@@ -146,9 +146,9 @@ impl Case for Footing {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         // Quadratic ones take minutes.
-        if element == Element::Tet10 { Vec::new() } else { vec![1] }
+        if element == Kind::Tet10 { Vec::new() } else { vec![1] }
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {

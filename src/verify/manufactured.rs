@@ -3,8 +3,8 @@
 use super::run::{Exact, Run};
 use super::{Case, Demand, Error, effectivity, material_line, orders};
 use crate::analytic::manufactured::Manufactured;
-use crate::material::Material;
-use crate::scene::Element;
+use crate::element::Kind;
+use crate::material::VonMises;
 use crate::tensor::Voigt;
 
 /// A solution and what acts on it.
@@ -43,10 +43,10 @@ pub const CASES: [Smooth; 3] = [
 ];
 
 const ELASTIC: Manufactured =
-    Manufactured { material: Material::elastic(1.0, 0.3), stretch: [0.0; 3], wave: [1.0, -0.5, 0.7] };
+    Manufactured { material: VonMises::elastic(1.0, 0.3), stretch: [0.0; 3], wave: [1.0, -0.5, 0.7] };
 
 /// Not nearly incompressible in plastic flow.
-const HARDENING: Material = Material {
+const HARDENING: VonMises = VonMises {
     young: 210_000.0,
     poisson: 0.1,
     yield_stress: Some(450.0),
@@ -106,11 +106,8 @@ impl Case for Smooth {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
-        match element {
-            Element::Tet10 => vec![2, 4, 8],
-            Element::Tet4 | Element::Hex8 => vec![4, 8, 16],
-        }
+    fn levels(&self, element: Kind) -> Vec<usize> {
+        if element.degree() == 1 { vec![4, 8, 16] } else { vec![2, 4, 8] }
     }
 
     fn force(&self) -> Option<fn([f64; 3]) -> [f64; 3]> {

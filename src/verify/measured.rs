@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use crate::scene::Element;
+use crate::element::Kind;
 
 /// What must hold of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -77,7 +77,7 @@ pub struct Measured {
     pub case: &'static str,
     /// What the case is.
     pub about: &'static str,
-    pub element: Element,
+    pub element: Kind,
     pub rows: Vec<Row>,
     /// What became of each demand, and of the runs themselves, when all are done.
     pub verdicts: Vec<Verdict>,
@@ -187,7 +187,7 @@ mod tests {
             errors: vec![Error::new("something", value, demand)],
         };
         let rows = values.iter().enumerate().map(row).collect();
-        let case = Measured { case: "case", about: "", element: Element::Hex8, rows, verdicts: Vec::new() };
+        let case = Measured { case: "case", about: "", element: Kind::Hex8, rows, verdicts: Vec::new() };
         Measured { verdicts: case.judge(), ..case }
     }
 

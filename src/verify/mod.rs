@@ -18,8 +18,9 @@ mod spheres;
 use serde::Serialize;
 
 use crate::comm::Comm;
-use crate::material::Material;
-use crate::scene::{Element, Scene, SceneError};
+use crate::element::Kind;
+use crate::material::VonMises;
+use crate::scene::{Scene, SceneError};
 use crate::study::StudyError;
 pub use measured::{Demand, Error, Measured, Row};
 use run::Exact;
@@ -37,7 +38,7 @@ pub trait Case: Sync {
     fn scene(&self) -> String;
 
     /// The meshes to solve it on, as levels of the scene, coarse to fine. If there are none, the element is left out.
-    fn levels(&self, element: Element) -> Vec<usize>;
+    fn levels(&self, element: Kind) -> Vec<usize>;
 
     /// What acts in the first body instead of the scene's first load, which then is a body force.
     fn force(&self) -> Option<fn([f64; 3]) -> [f64; 3]> {
@@ -45,7 +46,7 @@ pub trait Case: Sync {
     }
 
     /// How the history must end.
-    fn end(&self, _: Element) -> End {
+    fn end(&self, _: Kind) -> End {
         End::Reached
     }
 
@@ -102,7 +103,7 @@ const TIGHT: [&str; 3] =
 /// If the scene of the case has no discrete problem.
 pub fn measure(
     case: &dyn Case,
-    element: Element,
+    element: Kind,
     comm: &dyn Comm,
     tell: &mut dyn FnMut(&Measured),
 ) -> Result<Measured, StudyError> {
@@ -118,7 +119,7 @@ pub fn measure(
     Ok(measured)
 }
 
-fn at_level(case: &dyn Case, element: Element, level: usize, more: &[&str]) -> Result<Scene, SceneError> {
+fn at_level(case: &dyn Case, element: Kind, level: usize, more: &[&str]) -> Result<Scene, SceneError> {
     let text = case.scene();
     let plain = Scene::from_text(&text, case.name(), 1, &[])?;
     let name = element.name();
@@ -128,7 +129,7 @@ fn at_level(case: &dyn Case, element: Element, level: usize, more: &[&str]) -> R
 }
 
 /// The paper's steel, in MPa.
-const PAPER: Material = Material {
+const PAPER: VonMises = VonMises {
     young: 210_000.0,
     poisson: 0.29,
     yield_stress: Some(450.0),
@@ -137,20 +138,20 @@ const PAPER: Material = Material {
 };
 
 /// A material as a line of a scene.
-fn material_line(name: &str, material: &Material) -> String {
-    let Material { young, poisson, yield_stress, hardening, .. } = material;
+fn material_line(name: &str, material: &VonMises) -> String {
+    let VonMises { young, poisson, yield_stress, hardening, .. } = material;
     let limit = yield_stress.map_or(String::new(), |limit| format!(", yield_stress = {limit:?}"));
     format!("material.{name} = {{ young = {young:?}, poisson = {poisson:?}{limit}, hardening = {hardening:?} }}")
 }
 
 /// Orders in energy and displacement. A plastic front, where second derivatives jump, costs up to half an order; linear
 /// elements feel it in the displacement only.
-fn orders(element: Element, has_front: bool) -> [Demand; 2] {
-    match (element, has_front) {
-        (Element::Tet10, false) => [2.0, 3.0],
-        (Element::Tet10, true) => [1.5, 2.5],
-        (Element::Tet4 | Element::Hex8, false) => [1.0, 2.0],
-        (Element::Tet4 | Element::Hex8, true) => [1.0, 1.5],
+fn orders(element: Kind, has_front: bool) -> [Demand; 2] {
+    match (element.degree(), has_front) {
+        (1, false) => [1.0, 2.0],
+        (1, true) => [1.0, 1.5],
+        (_, false) => [2.0, 3.0],
+        (_, true) => [1.5, 2.5],
     }
     .map(Demand::Order)
 }
@@ -163,7 +164,7 @@ fn effectivity(run: &Run, exact: &dyn Exact) -> Error {
 }
 
 /// Elements in the order of the report.
-pub const ELEMENTS: [Element; 3] = [Element::Tet4, Element::Hex8, Element::Tet10];
+pub const ELEMENTS: [Kind; 3] = [Kind::Tet4, Kind::Hex8, Kind::Tet10];
 
 /// All results, for scripts.
 #[derive(Debug, Default, Serialize)]
@@ -209,7 +210,7 @@ mod tests {
     fn no_energy_is_farther_from_its_minimum_than_the_gap() {
         for case in select(&YIELDING.map(str::to_owned)).expect("they are known") {
             for element in ELEMENTS {
-                let level = if element == Element::Tet10 { 1 } else { 2 };
+                let level = if element == Kind::Tet10 { 1 } else { 2 };
                 for subdomains in [2, 4] {
                     let subdomains = format!("decomposition.subdomains={subdomains}");
                     let state = |solver: &[&str]| {

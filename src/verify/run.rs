@@ -1,18 +1,21 @@
 //! A solved case, and its distance from a closed form.
 
 use super::{Case, End, Error, Row};
+use crate::assembly::Region;
 use crate::assembly::loads::Load;
 use crate::comm::{Comm, maximum, ordered_sum};
 use crate::contact::ContactPair;
 use crate::decomposition::Subdomain;
+use crate::element::Kind;
 use crate::element::sample::{Sample, samples};
-use crate::estimate::{self, Estimate, Part};
+use crate::estimate::{self, Estimate};
+use crate::material::Law;
 use crate::model;
 use crate::model::discrete::Discrete;
 use crate::monitor::table::PhaseTable;
 use crate::monitor::timing::Timer;
 use crate::record::summary::Summary;
-use crate::scene::{Element, Scene};
+use crate::scene::Scene;
 use crate::study;
 use crate::study::{Solved, StudyError};
 use crate::tensor::{Voigt, apply, contract};
@@ -63,7 +66,7 @@ impl<'a> Run<'a> {
     }
 
     /// The element of the first body.
-    pub fn element(&self) -> Element {
+    pub fn element(&self) -> Kind {
         self.scene.body.values().next().expect("a scene has bodies").element
     }
 
@@ -102,7 +105,7 @@ impl<'a> Run<'a> {
     /// the norms of the closed form. Collective.
     pub fn norms(&self, exact: &dyn Exact) -> [f64; 2] {
         let sums = self.sum(|subdomain, u| {
-            let (body, tangent) = (subdomain.body, self.discrete.materials[subdomain.material].elastic_tangent());
+            let (body, tangent) = (subdomain.body, self.discrete.materials[subdomain.material].hooke().tangent());
             let energy = |strain: &Voigt| contract(&apply(&tangent, strain), strain);
             let mut sums = [0.0; 4];
             each_sample(subdomain, u, |sample, x, u| {
@@ -122,18 +125,17 @@ impl<'a> Run<'a> {
     pub fn effectivity(&self, exact: &dyn Exact) -> f64 {
         let Discrete { decomposition, materials, .. } = &self.discrete;
         let subdomains = &decomposition.subdomains;
-        let histories = |own: usize| self.solved.histories.get(own).map_or(&[][..], Vec::as_slice);
-        let parts: Vec<Part> = subdomains
-            .iter()
-            .enumerate()
-            .map(|(own, subdomain)| Part {
+        let history = |own: usize| self.solved.histories.get(own).map_or(&[][..], Vec::as_slice);
+        let numbered = subdomains.iter().enumerate();
+        let regions: Vec<Region> = numbered
+            .map(|(own, subdomain)| Region {
                 subdomain,
                 material: &materials[subdomain.material],
-                history: histories(own),
+                history: history(own),
             })
             .collect();
         let Estimate { errors, stresses } =
-            estimate::error(&parts, &self.solved.u, |own, x| exact.stress(subdomains[own].body, x));
+            estimate::error(&regions, &self.solved.u, |own, x| exact.stress(subdomains[own].body, x));
         let partial: Vec<f64> = errors.iter().zip(stresses).flat_map(|(e, s)| [e.iter().sum(), s]).collect();
         let sum = ordered_sum(self.comm, &decomposition.shares, &partial, 2);
         let estimated = self.summary().state.errors.discretisation.unwrap_or(f64::NAN);

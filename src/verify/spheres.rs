@@ -5,8 +5,9 @@ use super::run::{Run, pressure_error};
 use super::{Case, Demand, Error, PAPER, effectivity, material_line, orders};
 use crate::analytic::hollow_sphere::{HollowSphere, SphereState, Unloaded};
 use crate::analytic::nested_spheres::NestedSpheres;
-use crate::material::{History, Material};
-use crate::scene::Element;
+use crate::element::Kind;
+use crate::material::von_mises::{PlasticState, VonMises};
+use crate::material::{Law, Variables};
 
 /// The sphere that takes the pressure.
 const SPHERE: HollowSphere = HollowSphere { inner: 100.0, outer: 200.0, material: PAPER };
@@ -44,11 +45,8 @@ pub(super) fn symmetry(body: &str) -> String {
     ["x", "y", "z"].map(plane).concat()
 }
 
-fn levels(element: Element) -> Vec<usize> {
-    match element {
-        Element::Tet10 => vec![2, 4, 8],
-        Element::Tet4 | Element::Hex8 => vec![4, 8, 16],
-    }
+fn levels(element: Kind) -> Vec<usize> {
+    if element.degree() == 1 { vec![4, 8, 16] } else { vec![2, 4, 8] }
 }
 
 impl Case for Hollow {
@@ -76,7 +74,7 @@ impl Case for Hollow {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         levels(element)
     }
 
@@ -120,17 +118,17 @@ pub(super) fn distance(x: [f64; 3]) -> f64 {
 
 /// What the better elements owe.
 fn within_a_percent(run: &Run) -> Demand {
-    if run.element() == Element::Tet4 { Demand::Shown } else { Demand::Finest(0.01) }
+    if run.element() == Kind::Tet4 { Demand::Shown } else { Demand::Finest(0.01) }
 }
 
 /// Linear elements yield as a whole: they know the front to half a cell.
 fn of_front(run: &Run) -> Demand {
-    if run.element() == Element::Tet10 { Demand::Finest(0.01) } else { Demand::Shown }
+    if run.element() == Kind::Tet10 { Demand::Finest(0.01) } else { Demand::Shown }
 }
 
 /// Relative error of the radius of a sphere that holds as much yielding volume as was found in the first body.
 fn front(run: &Run, exact: f64) -> f64 {
-    let share = run.share(|body, strain| body == 0 && PAPER.respond(strain, &History::default()).plastic);
+    let share = run.share(|body, strain| body == 0 && PAPER.respond(strain, &PlasticState::VIRGIN).plastic);
     let [a, b] = [SPHERE.inner, SPHERE.outer].map(|r| r.powi(3));
     (a + share * (b - a)).cbrt() / exact - 1.0
 }
@@ -139,7 +137,7 @@ fn front(run: &Run, exact: f64) -> f64 {
 pub struct Nested;
 
 const NESTED: NestedSpheres = NestedSpheres { inner: SPHERE, outer_radius: 300.0, outer_material: ELASTIC, gap: 0.05 };
-const ELASTIC: Material = Material::elastic(PAPER.young, PAPER.poisson);
+const ELASTIC: VonMises = VonMises::elastic(PAPER.young, PAPER.poisson);
 const PRESSURE: f64 = 600.0;
 
 impl Case for Nested {
@@ -171,7 +169,7 @@ impl Case for Nested {
         )
     }
 
-    fn levels(&self, element: Element) -> Vec<usize> {
+    fn levels(&self, element: Kind) -> Vec<usize> {
         levels(element)
     }
 

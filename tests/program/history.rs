@@ -6,21 +6,21 @@ use crate::common::{
     COARSE, COARSEST, assert_close, assert_residuals, number, scene_file, solve, solve_tightly, vector,
 };
 use fetiplast::analytic::cycle::Cycle;
-use fetiplast::material::Material;
+use fetiplast::material::VonMises;
 use serde_json::Value;
 
 const RANKS: usize = 2;
 const EXACT: f64 = 1e-8;
 
 /// Isotropic, kinematic, both: as `--set`s and as the material of the closed form.
-fn hardenings() -> [([String; 2], Material); 3] {
+fn hardenings() -> [([String; 2], VonMises); 3] {
     [(10000.0, 0.0), (0.0, 10000.0), (3000.0, 9000.0)].map(|(hardening, kinematic_hardening)| {
         let keys = [
             format!("material.steel.hardening={hardening}"),
             format!("material.steel.kinematic_hardening={kinematic_hardening}"),
         ];
         let yield_stress = Some(450.0);
-        (keys, Material { yield_stress, hardening, kinematic_hardening, ..Material::elastic(210_000.0, 0.29) })
+        (keys, VonMises { yield_stress, hardening, kinematic_hardening, ..VonMises::elastic(210_000.0, 0.29) })
     })
 }
 

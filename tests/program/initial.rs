@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::common::fields::{Fields, State, difference, state_at};
 use crate::common::{Run, assert_refused, assert_scene_refused, check, solve, solve_tightly};
 use fetiplast::analytic::cycle::Cycle;
-use fetiplast::material::Material;
+use fetiplast::material::VonMises;
 use hdf5_metno::File;
 
 /// Two blocks in contact, coarse, and with both kinds of hardening.
@@ -66,7 +66,7 @@ fn cycles_of_a_bar_may_be_taken_one_run_at_a_time() {
     let hardening = ["material.steel.hardening=3000", "material.steel.kinematic_hardening=9000"];
     let yield_stress = Some(450.0);
     let material =
-        Material { yield_stress, hardening: 3000.0, kinematic_hardening: 9000.0, ..Material::elastic(210_000.0, 0.29) };
+        VonMises { yield_stress, hardening: 3000.0, kinematic_hardening: 9000.0, ..VonMises::elastic(210_000.0, 0.29) };
     let mut exact = Cycle::new(material);
     let mut before: Option<Run> = None;
     for (stress, parts) in [(500.0, 2), (0.0, 3), (-620.0, 5), (300.0, 2), (0.0, 4)] {

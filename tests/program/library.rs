@@ -3,7 +3,7 @@
 use crate::common::fields::Fields;
 use crate::common::{Run, assert_close, assert_residuals, solve, vector};
 use fetiplast::analytic::hertz::Hertz;
-use fetiplast::material::Material;
+use fetiplast::material::VonMises;
 
 fn scene(name: &str, sets: &[&str]) -> Run {
     solve(2, &format!("{}/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR")), sets).converged()
@@ -19,7 +19,7 @@ fn a_ball_on_a_block_is_near_hertz() {
     let run = scene("hertz", &["solver.accuracy=0.1"]);
     let force = 4.0 * vector(&run.summary()["reactions"]["push"])[2].abs();
     // Two bodies that give as much are half as stiff as one on a rigid ball.
-    let exact = Hertz::new(&Material::elastic(0.5 * 210_000.0, 0.3), 100.0, force);
+    let exact = Hertz::new(&VonMises::elastic(0.5 * 210_000.0, 0.3), 100.0, force);
     assert_close("approach", exact.approach, 0.01, 0.04);
     let fields = Fields::read(&run.result());
     let status = fields.integers_of_points("contact_status");

@@ -4,7 +4,7 @@
 use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
 use crate::common::{assert_close, assert_near, assert_residuals, scene_file, solve, solve_tightly, vector};
 use fetiplast::analytic::cycle::Cycle;
-use fetiplast::material::Material;
+use fetiplast::material::VonMises;
 
 const YOUNG: f64 = 210_000.0;
 const POISSON: f64 = 0.29;
@@ -109,7 +109,7 @@ fn a_moving_floor_presses_and_lets_go() {
         contact = { floor = 0.8 }"#;
     let directory = tempfile::tempdir().unwrap();
     let run = solve_tightly(2, &scene_file(directory.path(), &held(rest)), &[]);
-    let material = Material { yield_stress: Some(450.0), hardening: 1e4, ..Material::elastic(YOUNG, POISSON) };
+    let material = VonMises { yield_stress: Some(450.0), hardening: 1e4, ..VonMises::elastic(YOUNG, POISSON) };
     let mut exact = Cycle::new(material);
     for (state, factor) in [(1, 1.0), (2, 0.0), (3, 0.8)] {
         // The floor carries no tension.

@@ -5,7 +5,7 @@ use crate::common::fields::Fields;
 use crate::common::{Run, assert_close, assert_near, number, solve, vector};
 use fetiplast::analytic::hollow_sphere::HollowSphere;
 use fetiplast::analytic::nested_spheres::NestedSpheres;
-use fetiplast::material::Material;
+use fetiplast::material::VonMises;
 
 const RADIUS: f64 = 200.0;
 
@@ -18,8 +18,8 @@ const COARSE: [&str; 2] =
 /// Errors relative to the closed form: of the contact force, and root mean squares of those of the contact pressure and of
 /// the displacement of the outer sphere at the interface.
 fn errors(run: &Run) -> [f64; 3] {
-    let elastic = Material::elastic(210_000.0, 0.29);
-    let material = Material { yield_stress: Some(450.0), hardening: 10_000.0, ..elastic };
+    let elastic = VonMises::elastic(210_000.0, 0.29);
+    let material = VonMises { yield_stress: Some(450.0), hardening: 10_000.0, ..elastic };
     let inner = HollowSphere { inner: 100.0, outer: RADIUS, material };
     let spheres = NestedSpheres { inner, outer_radius: 300.0, outer_material: elastic, gap: 0.05 };
     let exact = spheres.loaded(600.0).expect("no wall yields through");

@@ -10,7 +10,6 @@ use crate::assembly::flow::Flow;
 use crate::assembly::{Region, stiffness};
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
-use crate::material::Material;
 use crate::monitor::timing::Timer;
 
 /// Change of a tangent's entries, relative to its diagonal, that the preconditioner does not follow. (On the benchmark at
@@ -130,7 +129,8 @@ impl Tangents {
     ) -> (Vec<f64>, Option<NotDefinite>) {
         let mut failure: Option<NotDefinite> = None;
         let mut factorised = Vec::with_capacity(u.len());
-        for (own, &Region { subdomain, material, history }) in regions.iter().enumerate() {
+        for (own, region) in regions.iter().enumerate() {
+            let subdomain = region.subdomain;
             // An elastic tangent that was elastic before is the same matrix.
             let unchanged = self.bases[own].is_elastic() && yielding[own] == 0;
             if unchanged || failure.is_some() {
@@ -146,7 +146,7 @@ impl Tangents {
             let pattern = &on.factors.symbolic(own).pattern;
             self.assembled.resize(pattern.rows.len(), 0.0);
             let (assembled, at) = (&mut self.assembled, (&u[own][..], &flows[own][..]));
-            on.timer.time("assembly", || stiffness::assemble(subdomain, material, history, at, pattern, assembled));
+            on.timer.time("assembly", || stiffness::assemble(region, at, pattern, assembled));
             let known = self.bases[own].factor.is_some();
             let change = if known { pattern.difference(&self.values[own], assembled) } else { f64::INFINITY };
             // Where twins are elastic on other ranks only, it gets what it would get from one of them here.
@@ -250,15 +250,14 @@ impl Tangents {
 
 /// Lower values of the tangent that a factor is of.
 fn tangent(region: &Region, own: usize, basis: &Basis, factors: &Factors) -> Vec<f64> {
-    let &Region { subdomain, material, history } = region;
     let pattern = &factors.symbolic(own).pattern;
     let mut values = vec![0.0; pattern.rows.len()];
     match basis {
         Basis::Elastic => {
-            let (material, rest) = (Material { yield_stress: None, ..*material }, vec![0.0; subdomain.dofs()]);
-            stiffness::assemble(subdomain, &material, &[], (&rest, &[]), pattern, &mut values)
+            let rest = vec![0.0; region.subdomain.dofs()];
+            stiffness::assemble(&Region { history: &[], ..*region }, (&rest, &[]), pattern, &mut values)
         }
-        Basis::At(u, flow) => stiffness::assemble(subdomain, material, history, (u, flow), pattern, &mut values),
+        Basis::At(u, flow) => stiffness::assemble(region, (u, flow), pattern, &mut values),
     };
     values
 }

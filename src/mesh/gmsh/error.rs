@@ -176,31 +176,19 @@ pub enum Problem {
         /// Their kind.
         kind: &'static str,
     },
-    /// Other cells where hexahedra are wanted.
-    #[error(
-        "volume `{volume}` has {cells} {kind} cells, but element = \"hex8\" needs hexahedra alone: mesh with `Transfinite \
-         Volume` and `Recombine Surface`, or `Mesh.SubdivisionAlgorithm = 2;`, or take element = \"tet4\""
-    )]
-    NoHexahedra {
+    /// Other cells than those that the element is made of.
+    #[error("volume `{volume}` has {cells} {kind} cells, but element = \"{element}\" needs {needs}")]
+    OtherCells {
         /// Name of the volume.
         volume: String,
-        /// Cells that are none.
+        /// Cells that are others.
         cells: u64,
         /// Kind of the first of them.
         kind: &'static str,
-    },
-    /// Other cells where quadratic tetrahedra are wanted.
-    #[error(
-        "volume `{volume}` has {cells} {kind} cells, but element = \"tet10\" needs tetrahedra of second order alone: mesh with \
-         `Mesh.ElementOrder = 2;` or `SetOrder 2;` and without `Recombine`, or take another element"
-    )]
-    NoQuadratic {
-        /// Name of the volume.
-        volume: String,
-        /// Cells that are none.
-        cells: u64,
-        /// Kind of the first of them.
-        kind: &'static str,
+        /// Name of the element.
+        element: &'static str,
+        /// Which cells it needs, and how to get them.
+        needs: &'static str,
     },
     /// Elements without a positive volume.
     #[error(

@@ -1,5 +1,7 @@
 //! Kinds of cells by Gmsh's numbers.
 
+use crate::element::{self, Gmsh};
+
 /// A kind of cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
@@ -14,9 +16,6 @@ pub struct Kind {
     /// Whether it is of first order, with nodes at its corners only.
     pub linear: bool,
 }
-
-/// Numbers of the cells of second order that are read: triangle and tetrahedron.
-const QUADRATIC: [i32; 2] = [9, 11];
 
 /// Corners, sides and volumes up to second order, and the common ones beyond (Gmsh reference manual, "MSH file format").
 const KINDS: [Kind; 26] = [
@@ -59,7 +58,8 @@ const fn curved(number: i32, name: &'static str, dimension: i32, nodes: usize) -
 impl Kind {
     /// Whether cells of this kind can be faces or elements.
     pub fn is_read(&self) -> bool {
-        self.dimension >= 2 && (self.linear || QUADRATIC.contains(&self.number))
+        let of_element = |gmsh: Gmsh| [gmsh.cell, gmsh.face].contains(&self.number);
+        self.dimension >= 2 && (self.linear || element::Kind::ALL.iter().any(|kind| of_element(kind.gmsh())))
     }
 
     /// The kind of this number.

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use super::Msh;
 use super::error::Problem;
 use super::volume::{higher_order, listed};
-use crate::element::Kind;
 use crate::mesh::faces::{Neighbours, key};
 use crate::mesh::solid::{NamedSurface, SolidMesh};
 use crate::mesh::split;
@@ -94,9 +93,9 @@ impl Boundary<'_> {
                 }
             };
             for cell in block.nodes.chunks_exact(block.kind.nodes) {
-                match self.mesh.elements.kind() {
-                    Kind::Tet4 => split::triangles(cell, |triangle| add(&triangle)),
-                    Kind::Tet10 | Kind::Hex8 => add(cell),
+                match self.mesh.elements.kind().gmsh().is_split() {
+                    true => split::triangles(cell, |triangle| add(&triangle)),
+                    false => add(cell),
                 }
             }
         }

@@ -36,15 +36,13 @@ impl Msh {
             *index = points.len() as u32;
             points.push(*point);
         }
-        let (mut nodes, mut regions) = (Vec::new(), Vec::new());
+        let (mut nodes, mut regions, gmsh) = (Vec::new(), Vec::new(), kind.gmsh());
         // Both sides of a face are cut alike because nodes keep their order.
         for (block, region) in &blocks {
             for cell in block.nodes.chunks_exact(block.kind.nodes) {
-                match kind {
-                    Kind::Tet4 => split::tetrahedra(cell, |tet| nodes.extend(tet.map(|n| index[n as usize]))),
-                    // Gmsh has the last two middles the other way round.
-                    Kind::Tet10 => nodes.extend([0, 1, 2, 3, 4, 5, 6, 7, 9, 8].map(|k| index[cell[k] as usize])),
-                    Kind::Hex8 => nodes.extend(cell.iter().map(|&n| index[n as usize])),
+                match gmsh.is_split() {
+                    true => split::tetrahedra(cell, |tet| nodes.extend(tet.map(|n| index[n as usize]))),
+                    false => nodes.extend(gmsh.order.iter().map(|&k| index[cell[k] as usize])),
                 }
             }
             if volumes.len() > 1 {
@@ -183,18 +181,17 @@ fn not_whole(volumes: &[String], Found { flaw, near, regions: [one, other] }: Fo
 
 /// Refuses cells that the kind of element cannot be made of.
 fn refuse_others(volume: &str, kind: Kind, blocks: &[&Block]) -> Result<(), Problem> {
-    let fits = |block: &Block| match kind {
-        Kind::Tet4 => block.kind.linear,
-        Kind::Tet10 | Kind::Hex8 => block.kind.dimension == 3 && block.kind.nodes == kind.nodes(),
-    };
+    let gmsh = kind.gmsh();
+    let fits = |block: &Block| if gmsh.is_split() { block.kind.linear } else { block.kind.number == gmsh.cell };
     let others: Vec<&&Block> = blocks.iter().filter(|block| !fits(block)).collect();
     let Some(first) = others.first() else { return Ok(()) };
     let cells = others.iter().map(|block| block.cells).sum();
-    let (volume, found) = (volume.to_owned(), first.kind.name);
-    Err(match kind {
-        Kind::Hex8 if first.kind.linear => Problem::NoHexahedra { volume, cells, kind: found },
-        Kind::Tet10 => Problem::NoQuadratic { volume, cells, kind: found },
-        Kind::Tet4 | Kind::Hex8 => higher_order(format!("volume `{volume}`"), blocks.iter().copied()),
+    Err(match gmsh.needs {
+        Some(needs) if first.kind.linear || kind.degree() > 1 => {
+            let volume = volume.to_owned();
+            Problem::OtherCells { volume, cells, kind: first.kind.name, element: kind.name(), needs }
+        }
+        _ => higher_order(format!("volume `{volume}`"), blocks.iter().copied()),
     })
 }
 

@@ -2,7 +2,6 @@
 
 use std::collections::HashSet;
 
-use crate::element::Kind;
 use crate::mesh::SolidMesh;
 use crate::mesh::boxes::{Box3, around};
 use crate::mesh::faces::{Neighbours, OUTSIDE};
@@ -124,26 +123,12 @@ pub(super) fn facets(mesh: &SolidMesh, neighbours: &Neighbours) -> Vec<Facet> {
 
 /// The least height of a tetrahedron, or of those that the edges at the corners of a hexahedron span.
 fn height(mesh: &SolidMesh, nodes: &[u32]) -> f64 {
-    const AT_CORNERS: [[usize; 4]; 8] = [
-        [0, 1, 3, 4],
-        [1, 2, 0, 5],
-        [2, 3, 1, 6],
-        [3, 0, 2, 7],
-        [4, 7, 5, 0],
-        [5, 4, 6, 1],
-        [6, 5, 7, 2],
-        [7, 6, 4, 3],
-    ];
-    let tetrahedra: &[[usize; 4]] = match mesh.elements.kind() {
-        Kind::Tet4 | Kind::Tet10 => &[[0, 1, 2, 3]],
-        Kind::Hex8 => &AT_CORNERS,
-    };
     let of = |tet: &[usize; 4]| {
         let [a, b, c, d] = tet.map(|k| mesh.points[nodes[k] as usize]);
         let largest = [[a, b, c], [a, b, d], [b, c, d], [a, c, d]].iter().map(area).fold(0.0, f64::max);
         0.5 * volume(a, b, c, d).abs() / largest
     };
-    tetrahedra.iter().map(of).fold(f64::INFINITY, f64::min)
+    mesh.elements.kind().cell().spanned().iter().map(of).fold(f64::INFINITY, f64::min)
 }
 
 /// The nodes of two facets with an edge in common, if the other two faces of their tetrahedron are there, too, but no element

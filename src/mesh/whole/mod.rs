@@ -22,7 +22,6 @@ use super::boxes::{Box3, BoxTree, around};
 use super::connectivity::split_into_pieces;
 use super::faces::{Neighbours, OUTSIDE};
 use super::near::{of_points, pierces, to_triangle, volume};
-use crate::element::Kind;
 
 pub use facet::NEAR;
 use facet::{Facet, facets, hole_between, sorted};
@@ -112,7 +111,7 @@ pub fn pieces(mesh: &SolidMesh, neighbours: &Neighbours) -> Result<Vec<u32>, Fou
 
 /// Refuses elements that share corners of a face, but not its middles.
 fn middles(mesh: &SolidMesh, neighbours: &Neighbours) -> Result<(), Found> {
-    if mesh.elements.kind() != Kind::Tet10 {
+    if mesh.elements.kind().middles().is_empty() {
         return Ok(());
     }
     let (mut count, mut first) = (0, None);
@@ -133,9 +132,9 @@ fn middles(mesh: &SolidMesh, neighbours: &Neighbours) -> Result<(), Found> {
 
 /// Refuses boundary faces that touch beyond the nodes that they share.
 fn apart(mesh: &SolidMesh, facets: &[Facet], tree: &BoxTree) -> Result<(), Found> {
-    let boundary: HashSet<[u32; 3]> = match mesh.elements.kind() {
-        Kind::Tet4 => facets.iter().map(|facet| sorted(facet.ids)).collect(),
-        Kind::Tet10 | Kind::Hex8 => HashSet::new(),
+    let boundary: HashSet<[u32; 3]> = match mesh.elements.kind().gmsh().is_split() {
+        true => facets.iter().map(|facet| sorted(facet.ids)).collect(),
+        false => HashSet::new(),
     };
     let (mut tears, mut holes, mut hole) = (Tears::default(), BTreeSet::new(), None);
     tree.pairs(|one, other| {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::element::Kind;
 use crate::element::tet10::EDGES;
 use crate::mesh::{Elements, Mapped, split};
 use crate::random::Random;

@@ -1,6 +1,7 @@
-use crate::assembly::stress;
+use crate::assembly::{Region, stress};
 use crate::comm::threads;
 use crate::fixture::{not_matching, two_bricks, two_meshes};
+use crate::material::Law;
 use crate::model;
 use crate::monitor::timing::Timer;
 use crate::record::summary::Summary;
@@ -22,7 +23,7 @@ fn solve(scene: &Scene, ranks: usize) -> Solution {
         let mut stresses = Vec::new();
         for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(&solved.u) {
             let material = discrete.materials[subdomain.material];
-            let samples = stress::samples(subdomain, &material, &[], u);
+            let samples = stress::samples(&Region::virgin(subdomain, &material), u);
             stresses.extend(samples.iter().map(|sample| (sample.weight, sample.stress, material)));
         }
         (solved.summary, stresses)
@@ -36,7 +37,7 @@ impl Solution {
     fn distance(&self, other: Option<&Self>) -> f64 {
         let square = |(k, (weight, stress, material)): (usize, &(f64, Voigt, crate::material::Material))| {
             let other = other.map_or([0.0; 6], |other| other.stresses[k].1);
-            weight * material.complementary_square(&std::array::from_fn(|i| stress[i] - other[i]))
+            weight * material.hooke().complementary_square(&std::array::from_fn(|i| stress[i] - other[i]))
         };
         self.stresses.iter().enumerate().map(square).sum::<f64>().sqrt()
     }

@@ -17,7 +17,7 @@ use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::basis::{Bases, Basis};
-use crate::material::History;
+use crate::material::{Variable, history};
 use crate::model::Discrete;
 use crate::newton::Snapshot;
 use crate::restart::places::key;
@@ -132,13 +132,12 @@ impl<'a> Packer<'a> {
     }
 
     fn histories(&self) -> Vec<Field> {
-        let histories: Vec<&History> =
-            (0..self.own().len()).flat_map(|own| self.newton.committed.history(own)).collect();
-        let strains = histories.iter().flat_map(|history| history.plastic_strain).collect();
-        vec![
-            Field::of("histories/plastic_strain", 6, Values::Real(strains)),
-            Field::scalar("histories/kappa", histories.iter().map(|history| history.kappa).collect()),
-        ]
+        let histories = (0..self.own().len()).flat_map(|own| self.newton.committed.history(own));
+        let arrays = history::arrays(histories);
+        let field = |(of, values): (Variable, _)| {
+            Field::of(&format!("histories/{}", of.name), of.components, Values::Real(values))
+        };
+        arrays.map(field).collect()
     }
 
     /// Directions of plastic flow: of the iterate, and of what factors are of.

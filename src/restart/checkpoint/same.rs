@@ -10,7 +10,7 @@ use crate::comm::agree::agree;
 use crate::feti::Torn;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::basis::{Bases, Basis};
-use crate::material::History;
+use crate::material::{History, history};
 use crate::model::discrete::Discrete;
 use crate::restart::places::key;
 use crate::results::checkpoint::Checkpoint;
@@ -143,10 +143,8 @@ impl<'a> Reader<'a> {
 
     fn histories(&self) -> Result<Vec<Vec<History>>, Miss> {
         let part = self.part("histories")?;
-        let strains = part.read::<f64>(self.file, "histories/plastic_strain", 0)?;
-        let kappas = part.read::<f64>(self.file, "histories/kappa", 0)?;
-        let points = strains.as_chunks::<6>().0.iter().zip(kappas);
-        Ok(part.split(points.map(|(&plastic_strain, kappa)| History { plastic_strain, kappa }).collect(), 1))
+        let points = history::from_arrays(|name| part.read::<f64>(self.file, &format!("histories/{name}"), 0))?;
+        Ok(part.split(points, 1))
     }
 }
 

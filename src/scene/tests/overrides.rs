@@ -16,7 +16,8 @@ fn overrides_reach_every_kind_of_value() {
     ];
     let scene = one(&changes).unwrap();
     assert_eq!((scene.title.as_str(), scene.units.as_str()), ("two words", "m, N, Pa"));
-    assert_eq!(scene.material["steel"].hardening, 5.0);
+    let crate::material::Material::VonMises(steel) = scene.material["steel"];
+    assert_eq!(steel.hardening, 5.0);
     let Brick { origin, size, .. } = *scene.body["block"].brick().unwrap();
     assert_eq!((origin, size), ([1.0, 2.0, 3.0], [1.0, 1.0, 0.5]));
     assert_eq!(scene.support["base"].surface.face(), Some(Face::Xmin));

@@ -90,7 +90,7 @@ fn plane(scene: &Scene, slave: &SurfaceName, normal: [f64; 3]) -> Option<Conditi
 }
 
 fn degree(body: &Body) -> u64 {
-    crate::model::bodies::kind(body.element).degree() as u64
+    body.element.degree() as u64
 }
 
 /// The nodes that two bricks have in common along an axis, from the lowest; `None` if they have not, or no two.

@@ -6,7 +6,6 @@
 
 use crate::decomposition::Counts;
 use crate::element::Kind;
-use crate::model::bodies::kind;
 use crate::scene::{self, Cylinder, Face, Grid, Sphere};
 
 /// A structured body's cells.
@@ -40,12 +39,12 @@ impl<'a> Structured<'a> {
             scene::Shape::Sphere(Sphere { cells, .. }) => Cells::Sphere(cells.map(wide)),
             scene::Shape::Gmsh(_) => return None,
         };
-        Some(Self { kind: kind(body.element), shape: &body.shape, cells })
+        Some(Self { kind: body.element, shape: &body.shape, cells })
     }
 
     /// Of a mesh from a file, whose surfaces are taken for those of a cube.
     pub fn of_mesh(body: &'a scene::Body, counts: Counts) -> Self {
-        Self { kind: kind(body.element), shape: &body.shape, cells: Cells::Mesh(counts) }
+        Self { kind: body.element, shape: &body.shape, cells: Cells::Mesh(counts) }
     }
 
     /// Sizes of its mesh.
@@ -55,7 +54,7 @@ impl<'a> Structured<'a> {
             Cells::Sphere([around, through]) => 3 * around * around * through,
             Cells::Mesh(counts) => return counts,
         };
-        Counts { nodes: self.nodes(), cells, elements: self.kind.per_cell() * cells }
+        Counts { nodes: self.nodes(), cells, elements: self.kind.cell().per_hexahedron() * cells }
     }
 
     /// Nodes along each axis of a lattice with as many as the body has, or about as many.

@@ -1,0 +1,99 @@
+//! What the program asks of a material law. A law is a file with a type for its parameters and one for its state.
+
+use super::Hooke;
+use crate::tensor::{Tangent, Voigt};
+
+/// A variable of a [`Variables`], as results and checkpoints name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variable {
+    /// Its name, the same for all laws that have it.
+    pub name: &'static str,
+    /// Numbers a point.
+    pub components: usize,
+}
+
+/// What a material point remembers between load steps.
+pub trait Variables: Copy + PartialEq {
+    /// The state of a point that was never loaded.
+    const VIRGIN: Self;
+
+    /// The variables, in the order in which files have them.
+    fn variables() -> impl Iterator<Item = Variable>;
+
+    /// A variable, by its place among [`Self::variables`].
+    fn values(&self, variable: usize) -> &[f64];
+
+    /// The same, to be overwritten.
+    fn values_mut(&mut self, variable: usize) -> &mut [f64];
+}
+
+/// What a material point answers to a strain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Response {
+    /// Stress, the derivative of `energy` by the strain.
+    pub stress: Voigt,
+    /// One-step potential Psi, energy per volume.
+    pub energy: f64,
+    /// Whether the trial stress is outside the yield surface, by more than round-off.
+    pub plastic: bool,
+    /// Accumulated plastic strain at the end of the step.
+    pub equivalent_plastic_strain: f64,
+}
+
+/// A parameter that no material can have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BadParameter {
+    /// Its key in the scene.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What is allowed instead.
+    pub rule: &'static str,
+}
+
+/// A law: small strains, rate independent, with a convex potential Psi for a step from a committed state. Strains have
+/// engineering shears, stresses and moduli one unit.
+pub trait Law {
+    /// What a point remembers.
+    type State: Variables;
+
+    /// Refuses parameters that no material has.
+    ///
+    /// # Errors
+    /// The first bad one.
+    fn check(&self) -> Result<(), BadParameter>;
+
+    /// The law of small strains, `C_e`.
+    fn hooke(&self) -> Hooke;
+
+    /// Whether the material can yield.
+    fn yields(&self) -> bool;
+
+    /// Whether it flows without hardening, so that there are loads without an equilibrium.
+    fn has_limit(&self) -> bool;
+
+    /// Stress, potential and plasticity at `strain`, one step away from `committed`.
+    fn respond(&self, strain: &Voigt, committed: &Self::State) -> Response;
+
+    /// The consistent tangent d stress / d strain of the same step: symmetric, at most C_e. In an elastic step it is C_e to the
+    /// last bit. With a direction of `flow`, it is the tangent of [`crate::assembly::flow`].
+    fn stiffness(&self, strain: &Voigt, committed: &Self::State, flow: Option<&Voigt>) -> Tangent;
+
+    /// The direction of [`crate::assembly::flow`] after a `change` of the strain by a step of a length.
+    fn flow(&self, strain: &Voigt, committed: &Self::State, flow: Option<&Voigt>, step: (&Voigt, f64)) -> Voigt;
+
+    /// Psi(strain + change) - Psi(strain) - sigma(strain) : change >= 0, energy per volume: how far Psi is above its tangent. As
+    /// accurate for small changes as for large ones.
+    fn divergence(&self, strain: &Voigt, change: &Voigt, committed: &Self::State) -> f64;
+
+    /// The least that tangents are of the elastic stiffness; 1 for an elastic material.
+    fn least_tangent(&self) -> f64;
+
+    /// The state at the end of the step, to be committed once the load step has converged.
+    fn commit(&self, strain: &Voigt, committed: &Self::State) -> Self::State;
+
+    /// [`Self::stiffness`] without a direction of flow.
+    fn tangent(&self, strain: &Voigt, committed: &Self::State) -> Tangent {
+        self.stiffness(strain, committed, None)
+    }
+}
