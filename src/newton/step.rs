@@ -62,7 +62,7 @@ pub struct SolverState {
     pub bases: Vec<Bases>,
 }
 
-/// What is kept from step to step: factors, projector, multipliers.
+/// What is kept from step to step: factors, projector, the rows that the last program kept.
 pub struct StepSolver<'a> {
     pub(super) operator: DualOperator<'a>,
     pub(super) projector: Projector<'a>,

@@ -56,6 +56,15 @@ impl Inside {
         let square = space.dot(&residual, &residual);
         Self { residual, square, measured: square }
     }
+
+    /// Takes `step` times `P A p` away, given its squared norm and its product with the residual.
+    fn advance(&mut self, step: f64, projected: &[f64], (square_ap, change): (f64, f64)) {
+        axpy(-step, projected, &mut self.residual);
+        self.square += step * (step * square_ap - 2.0 * change);
+        if self.square < 0.0 {
+            self.square = 0.0;
+        }
+    }
 }
 
 /// The solver with the directions it keeps. As long as A and P stay the same it goes on from them: to solve loosely,
@@ -133,11 +142,7 @@ impl<'a> Pcpg<'a> {
             let step = slope / curvature;
             axpy(step, &p, x);
             axpy(-step, &ap, residual);
-            axpy(-step, &projected, &mut inside.residual);
-            inside.square += step * (step * square_ap - 2.0 * change);
-            if inside.square < 0.0 {
-                inside.square = 0.0;
-            }
+            inside.advance(step, &projected, (square_ap, change));
             statistics.cg += 1;
             self.keep(Direction { p, ap, curvature });
         }
