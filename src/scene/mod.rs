@@ -178,6 +178,11 @@ impl Scene {
         supports.chain(loads).chain(self.contact.values().flat_map(Contact::surfaces))
     }
 
+    /// Whether every body is a brick: only bricks have coarser levels that a solution can be passed on from.
+    pub fn is_of_bricks(&self) -> bool {
+        self.body.values().all(|body| body.brick().is_some())
+    }
+
     /// Whether a body takes part in a contact.
     pub fn touches(&self, body: &str) -> bool {
         self.contact.values().flat_map(Contact::surfaces).any(|surface| surface.body == body)
