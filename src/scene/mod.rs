@@ -85,7 +85,7 @@ pub struct Scene {
 
 impl Scene {
     /// The scene of this built-in name or file, with `sets` (each `dotted.path=value`) applied and the cells per edge
-    /// of every brick multiplied by `level`.
+    /// of every body that is not from a mesh file multiplied by `level`.
     ///
     /// # Errors
     /// An unknown name, an unreadable file, bad TOML, an override that does not fit, or a failed check, with its place.
