@@ -1,24 +1,20 @@
-//! What a scene prescribes at the end of each step of its load history: right-hand sides and nodal loads.
+//! The rows of B of a scene, and their right-hand sides at the end of each step of its load history.
 
 use super::ModelError;
-use super::discrete::Discrete;
-use crate::assembly::loads::{self, Load};
 use crate::comm::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{ConstraintError, Constraints, Support};
 use crate::contact::{ContactError, ContactPair};
 use crate::decomposition::Decomposition;
-use crate::feti::Torn;
-use crate::newton::loading::{Conditions, Stage};
 use crate::scene::{Contact, Scene, Step};
 use crate::vector::dot;
 
 /// Right-hand sides of a rank's rows.
 pub struct RightHandSides {
     /// At rest: contact gaps are there, prescribed displacements are not.
-    begin: Vec<f64>,
+    pub begin: Vec<f64>,
     /// At the end of each step.
-    ends: Vec<Vec<f64>>,
+    pub ends: Vec<Vec<f64>>,
 }
 
 /// What the rows are made of.
@@ -102,24 +98,4 @@ fn refuse_held(
     let of_contact = || depths.iter().filter(|(pair, _)| pairs[*pair].contact == contact);
     let depth = of_contact().fold(0.0_f64, |deepest, (_, depth)| deepest.max(*depth));
     Err(ContactError::Held { name: names[contact].clone(), nodes: of_contact().count(), depth })
-}
-
-/// What is prescribed at the beginning, and the stages from there; `zeros` are those of a torn vector.
-pub fn stages(scene: &Scene, discrete: &Discrete, zeros: &dyn Fn() -> Torn) -> (Conditions, Vec<Stage>) {
-    let RightHandSides { begin, ends } = &discrete.right_hand_sides;
-    let loads = |factor: &dyn Fn(&str) -> f64| {
-        let scaled = |(load, name): (&Load, &String)| load.times(factor(name));
-        let scaled: Vec<Load> = discrete.loads.iter().zip(scene.load.keys()).map(scaled).collect();
-        let mut loads = zeros();
-        for (subdomain, f) in discrete.decomposition.subdomains.iter().zip(&mut loads) {
-            loads::add(subdomain, &scaled, f);
-        }
-        loads
-    };
-    let stages = scene.steps().iter().zip(ends).map(|(step, rhs)| Stage {
-        end: Conditions { loads: loads(&|name| step.of_load(name)), rhs: rhs.clone() },
-        increments: step.increments,
-        halvings: step.halvings,
-    });
-    (Conditions { loads: zeros(), rhs: begin.clone() }, stages.collect())
 }

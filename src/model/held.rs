@@ -1,8 +1,8 @@
 //! Whether supports, contacts and loads hold all bodies: known before anything is factorised.
 
 use super::ModelError;
-use super::conditions;
 use super::discrete::Discrete;
+use super::history;
 use crate::comm::Comm;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::equilibrium::Unheld;
@@ -25,7 +25,7 @@ pub fn held(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Result<(), M
     let space = RowSpace::new(comm, shares, constraints);
     let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
     let mut coarse = Coarse::new(comm, &decomposition.clusters, subdomains, &modes, constraints, &gather);
-    let (_, stages) = conditions::stages(scene, discrete, &|| gather.zeros());
+    let (_, stages) = history::stages(scene, discrete, &|| gather.zeros());
     at_all_stages(scene, discrete, &mut coarse, &space, &modes, &stages)
 }
 

@@ -22,6 +22,7 @@ mod mapped;
 mod material;
 mod overrides;
 mod read;
+mod require;
 mod solver;
 mod step;
 mod surface;

@@ -175,7 +175,7 @@ pub fn solve_from(
         let deluxe = Deluxe::new(comm, shares, constraints, &gather, &schur);
         Preconditioner::new(&gather, schur, deluxe)
     });
-    let (loading::Conditions { loads, rhs }, stages) = model::conditions::stages(scene, discrete, &|| gather.zeros());
+    let (loading::Conditions { loads, rhs }, stages) = model::history::stages(scene, discrete, &|| gather.zeros());
     let mut problem = TornProblem {
         subdomains,
         materials: subdomains.iter().map(|s| discrete.materials[s.material]).collect(),
