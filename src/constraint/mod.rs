@@ -19,12 +19,14 @@ pub mod components;
 pub mod contact;
 pub mod dirichlet;
 pub mod gluing;
+pub mod prescribed;
 pub mod ties;
 
 use std::ops::Range;
 
 use thiserror::Error;
 
+use self::prescribed::Parallel;
 use self::ties::Ties;
 
 /// What a row stands for.
@@ -59,13 +61,11 @@ pub struct Term {
     pub value: f64,
 }
 
-/// One row: `sum of terms = rhs`, or `<= rhs` for contact.
+/// One row: `sum of terms = rhs`, or `<= rhs` for contact; see [`Row::right_hand_side`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// What it stands for.
     pub kind: Kind,
-    /// Right-hand side (length, times `scale`).
-    pub rhs: f64,
     /// Factor that made the row as long as it is: physical nodal force = `scale` times multiplier.
     pub scale: f64,
     /// Length of the row.
@@ -74,6 +74,8 @@ pub struct Row {
     pub terms: Vec<Term>,
     /// Components of a contact's condition that supports fix, which are part of the right-hand side.
     pub held: Vec<Held>,
+    /// Other contact conditions along the same direction; the right-hand side is that of the tightest.
+    pub parallel: Vec<Parallel>,
 }
 
 /// A component of a contact's condition that a support fixes.
@@ -108,8 +110,8 @@ impl Row {
         let relative = (1.0 / (flexibility * largest)).max(SOFTEST);
         if relative * JUMP <= 1.0 {
             self.length = (0.5 * relative.log2()).round().exp2();
-            self.rhs *= self.length;
             self.scale *= self.length;
+            self.parallel.iter_mut().for_each(|other| other.scale *= self.length);
             self.terms.iter_mut().for_each(|term| term.value *= self.length);
         }
     }
@@ -168,9 +170,9 @@ pub struct Constraints {
     pub uneven: bool,
     /// Nodes that short edges tie together.
     pub ties: Ties,
-    /// Contact pairs of own nodes without a row, because supports fix all of their nodes along the normal, and the distance
-    /// that is left (length).
-    pub idle: Vec<(usize, f64)>,
+    /// Contact pairs of own nodes without a row, because supports fix all of their nodes along the normal, and the components
+    /// that they fix.
+    pub idle: Vec<(usize, Vec<Held>)>,
 }
 
 /// Why the rows cannot be set up.
