@@ -19,20 +19,16 @@ use crate::constraint::Kind;
 use crate::decomposition::sums::NodeSums;
 use crate::decomposition::twins::{alike, twins};
 use crate::decomposition::{Cut, Subdomain};
-use crate::feti::Torn;
-use crate::feti::coarse::Coarse;
 use crate::feti::coarse::projector::Projector;
 use crate::feti::dual::coupling::Coupling;
-use crate::feti::dual::gather::Gather;
 use crate::feti::dual::operator::DualOperator;
-use crate::feti::dual::space::RowSpace;
 use crate::feti::dual::supported;
 use crate::feti::inverse::factor::{Factors, analyse};
 use crate::feti::inverse::hybrid::Hybrid;
-use crate::feti::inverse::kernel;
 use crate::feti::inverse::schur::Schur;
 use crate::feti::preconditioner::Preconditioner;
 use crate::feti::preconditioner::deluxe::Deluxe;
+use crate::feti::{Interconnection, Torn};
 use crate::material::History;
 use crate::model::{self, Discrete, ModelError, bodies};
 use crate::monitor::events::Event;
@@ -150,12 +146,10 @@ pub fn solve_from(
     let started = SystemTime::now();
     let Discrete { decomposition, constraints, .. } = discrete;
     let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains[..]);
-    let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
-    let space = RowSpace::new(comm, shares, constraints);
+    let connection = Interconnection::new(comm, decomposition, constraints);
     let sums = NodeSums::new(comm, decomposition);
-    let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
-    let mut coarse = timer
-        .time("coarse set-up", || Coarse::new(comm, &decomposition.clusters, subdomains, &modes, constraints, &gather));
+    let mut coarse = timer.time("coarse set-up", || connection.coarse(comm, decomposition, constraints));
+    let Interconnection { gather, space, modes } = connection;
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
     let precision = match scene.solver.precision {
         scene::Precision::Mixed => Precision::Single,
