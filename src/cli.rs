@@ -77,7 +77,7 @@ pub struct Source {
     /// A built-in scene (see `fetiplast scenes`) or a TOML file.
     #[arg(default_value = "two-blocks")]
     pub scene: String,
-    /// Refinement: this many times the cells along each edge of every brick.
+    /// Refinement: this many times the cells along each edge of every body that is not from a mesh file.
     #[arg(long, default_value_t = 1, value_parser = values::level, allow_negative_numbers = true)]
     pub level: usize,
     /// Change a key of the scene, for example decomposition.subdomains=48; may be repeated.

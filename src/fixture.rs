@@ -1,20 +1,18 @@
 //! Small torn problems for the tests of all rooms, on any number of ranks.
 
+use std::ops::Deref;
+
 use faer::Mat;
 
 use crate::assembly::{Region, stiffness};
 use crate::comm::{Comm, threads};
 use crate::constraint::Row;
 use crate::decomposition::Subdomain;
-use crate::feti::Torn;
 use crate::feti::coarse::{Coarse, Floating};
-use crate::feti::dual::gather::Gather;
 use crate::feti::dual::operator::DualOperator;
-use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::factor::{Factors, analyse};
 use crate::feti::inverse::hybrid::Hybrid;
-use crate::feti::inverse::kernel;
-use crate::feti::inverse::kernel::RigidModes;
+use crate::feti::{Interconnection, Torn};
 use crate::material::Material;
 use crate::model;
 use crate::model::discrete::Discrete;
@@ -151,21 +149,22 @@ fn owned(sets: &[&str]) -> Vec<String> {
 pub struct Setup<'a> {
     pub comm: &'a dyn Comm,
     pub discrete: Discrete,
-    pub gather: Gather<'a>,
-    pub space: RowSpace<'a>,
-    pub modes: Vec<RigidModes>,
+    pub connection: Interconnection<'a>,
+}
+
+impl<'a> Deref for Setup<'a> {
+    type Target = Interconnection<'a>;
+
+    fn deref(&self) -> &Interconnection<'a> {
+        &self.connection
+    }
 }
 
 impl<'a> Setup<'a> {
     pub fn new(scene: &Scene, comm: &'a dyn Comm) -> Self {
         let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
-        let Discrete { decomposition, constraints, .. } = &discrete;
-        let subdomains = &decomposition.subdomains;
-        let dofs = subdomains.iter().map(Subdomain::dofs).collect();
-        let gather = Gather::new(comm, &decomposition.shares, constraints, dofs);
-        let space = RowSpace::new(comm, &decomposition.shares, constraints);
-        let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
-        Self { comm, discrete, gather, space, modes }
+        let connection = Interconnection::new(comm, &discrete.decomposition, &discrete.constraints);
+        Self { comm, discrete, connection }
     }
 
     pub fn subdomains(&self) -> &[Subdomain] {
@@ -188,7 +187,7 @@ impl<'a> Setup<'a> {
     /// Without a factor.
     pub fn bare_coarse(&self) -> Coarse<'a> {
         let Discrete { decomposition, constraints, .. } = &self.discrete;
-        Coarse::new(self.comm, &decomposition.clusters, self.subdomains(), &self.modes, constraints, &self.gather)
+        self.connection.coarse(self.comm, decomposition, constraints)
     }
 
     /// Factors of the elastic stiffness matrices, and these.

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::Kind;
 use super::components::Components;
 use super::contact::Side;
+use super::prescribed::Prescribed;
 use super::ties::Ties;
-use super::{ConstraintError, Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, gluing};
+use super::{Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, gluing};
 use crate::comm::{Comm, all_gather_u64};
 use crate::contact::ContactPair;
 use crate::decomposition::{Decomposition, InterfaceNode};
@@ -19,19 +20,17 @@ struct Cluster {
 
 impl Constraints {
     /// All rows that touch this rank's subdomains. `pairs` are the contact pairs of the whole scene, `stiffness` that of all
-    /// subdomains (Young's modulus). Collective.
-    ///
-    /// # Errors
-    /// If supports contradict each other: the same error on every rank.
+    /// subdomains (Young's modulus). Supports agree (see [`dirichlet::check`]). Of parallel contact conditions that gives the
+    /// row which is the tightest at the time `at`. Collective.
     pub fn new(
         comm: &dyn Comm,
         decomposition: &Decomposition,
         supports: &[Support],
         pairs: &[ContactPair],
         stiffness: &[f64],
-    ) -> Result<Self, ConstraintError> {
+        at: &Prescribed,
+    ) -> Self {
         let largest = stiffness.iter().copied().fold(0.0, f64::max);
-        dirichlet::check(comm, &decomposition.interface, supports)?;
         let ties = Ties::new(comm, decomposition);
         let (cluster_of, clusters) = clusters(pairs, &ties);
         let clustered = gather_nodes(comm, decomposition, &cluster_of);
@@ -67,8 +66,8 @@ impl Constraints {
             for &number in &cluster.pairs {
                 let pair = &pairs[number];
                 match contact::row(number, pair, |node| sides[&node]) {
-                    Ok(row) => contact::add_tightest(contacts.entry(pair.slave).or_default(), row),
-                    Err(left) => result.idle.push((number, left)),
+                    Ok(row) => contact::add_tightest(contacts.entry(pair.slave).or_default(), row, at),
+                    Err(held) => result.idle.push((number, held)),
                 }
             }
             rows.extend(contacts.into_values().flatten());
@@ -76,7 +75,7 @@ impl Constraints {
             let subdomains: BTreeSet<u32> = sides.values().flat_map(|(n, _)| n.copies.iter().copied()).collect();
             result.push_block(rows, subdomains.into_iter().collect(), decomposition);
         }
-        Ok(result)
+        result
     }
 
     /// Appends the rows of a block; nothing if it has none.

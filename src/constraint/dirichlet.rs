@@ -2,12 +2,13 @@
 
 use std::collections::HashMap;
 
+use super::prescribed::Prescribed;
 use super::{ConstraintError, Kind, Row, Support, Term};
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::InterfaceNode;
 
-/// For each component, the support that fixes it at a node, and the value.
-pub(super) fn fixed(node: &InterfaceNode, supports: &[Support]) -> [Option<(usize, f64)>; 3] {
+/// For each component, the support that fixes it at a node.
+pub(super) fn fixed(node: &InterfaceNode, supports: &[Support]) -> [Option<usize>; 3] {
     [0, 1, 2].map(|axis| at(node, supports, axis).next())
 }
 
@@ -25,45 +26,49 @@ pub fn fixed_at(comm: &dyn Comm, interface: &[InterfaceNode], supports: &[Suppor
     nodes.iter().map(|node| found.get(node).copied().unwrap_or_default()).collect()
 }
 
-/// The supports that fix a component at a node, and their values.
-fn at(node: &InterfaceNode, supports: &[Support], axis: usize) -> impl Iterator<Item = (usize, f64)> {
+/// The supports that fix a component at a node.
+fn at(node: &InterfaceNode, supports: &[Support], axis: usize) -> impl Iterator<Item = usize> {
     let holds = move |s: &Support| s.fixed[axis] && node.surfaces.contains(&(s.surface as u32));
-    supports.iter().enumerate().filter(move |(_, s)| holds(s)).map(move |(index, s)| (index, s.displacement[axis]))
+    supports.iter().enumerate().filter(move |(_, s)| holds(s)).map(|(index, _)| index)
 }
 
-/// Whether supports agree wherever they meet. Collective.
+/// Whether supports agree at a time wherever they meet. Collective.
 ///
 /// # Errors
-/// If two supports prescribe different values at a node. Every rank returns the error of the lowest such node.
-pub(super) fn check(comm: &dyn Comm, nodes: &[InterfaceNode], supports: &[Support]) -> Result<(), ConstraintError> {
+/// If two of them prescribe different values at one node: on every rank, that of the lowest such node.
+pub fn check(
+    comm: &dyn Comm,
+    nodes: &[InterfaceNode],
+    supports: &[Support],
+    time: &Prescribed,
+) -> Result<(), ConstraintError> {
+    let value = |support: usize, axis: usize| time.displacements[support][axis];
     let conflict = |node: &InterfaceNode| {
         (0..3).find_map(|axis| {
-            let mut values = at(node, supports, axis);
-            let first = values.next()?;
-            let second = values.find(|other| other.1 != first.1)?;
-            Some([node.node, first.0 as u64, second.0 as u64, axis as u64])
+            let mut fixing = at(node, supports, axis);
+            let first = fixing.next()?;
+            let second = fixing.find(|&other| value(other, axis) != value(first, axis))?;
+            Some([node.node, first as u64, second as u64, axis as u64])
         })
     };
     let mine = nodes.iter().find_map(conflict);
     let all = all_gather_u64(comm, mine.as_slice().as_flattened());
     let Some(lowest) = all.chunks_exact(4).min() else { return Ok(()) };
-    let (first, second) = (&supports[lowest[1] as usize], &supports[lowest[2] as usize]);
-    let axis = lowest[3] as usize;
+    let [first, second, axis] = [1, 2, 3].map(|k| lowest[k] as usize);
     Err(ConstraintError::Conflict {
-        first: first.name.clone(),
-        second: second.name.clone(),
+        first: supports[first].name.clone(),
+        second: supports[second].name.clone(),
         axis: ['x', 'y', 'z'][axis],
-        first_value: first.displacement[axis],
-        second_value: second.displacement[axis],
+        first_value: value(first, axis),
+        second_value: value(second, axis),
     })
 }
 
 /// One row for each fixed component: `sum of copies / sqrt(m) = sqrt(m) value`.
-pub(super) fn rows(node: &InterfaceNode, fixed: &[Option<(usize, f64)>; 3]) -> Vec<Row> {
+pub(super) fn rows(node: &InterfaceNode, fixed: &[Option<usize>; 3]) -> Vec<Row> {
     let root = (node.copies.len() as f64).sqrt();
-    let row = |axis: usize, support: usize, value: f64| Row {
+    let row = |axis: usize, support: usize| Row {
         kind: Kind::Support { support, axis },
-        rhs: root * value,
         scale: 1.0 / root,
         length: 1.0,
         terms: node
@@ -72,6 +77,7 @@ pub(super) fn rows(node: &InterfaceNode, fixed: &[Option<(usize, f64)>; 3]) -> V
             .map(|&subdomain| Term { subdomain, node: node.node, axis, value: 1.0 / root })
             .collect(),
         fixed: Vec::new(),
+        parallel: Vec::new(),
     };
-    (0..3).filter_map(|axis| fixed[axis].map(|(support, value)| row(axis, support, value))).collect()
+    (0..3).filter_map(|axis| fixed[axis].map(|support| row(axis, support))).collect()
 }

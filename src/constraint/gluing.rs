@@ -36,7 +36,7 @@ fn compare(node: u64, axis: usize, first: &[u32], second: &[u32]) -> Row {
     let before = first.iter().map(|&subdomain| Term { subdomain, node, axis, value: q as f64 * unit });
     let behind = second.iter().map(|&subdomain| Term { subdomain, node, axis, value: -(p as f64) * unit });
     let terms = before.chain(behind).collect();
-    Row { kind: Kind::Gluing, rhs: 0.0, scale: q as f64 * unit, length: 1.0, terms, fixed: Vec::new() }
+    Row { kind: Kind::Gluing, scale: q as f64 * unit, length: 1.0, terms, fixed: Vec::new(), parallel: Vec::new() }
 }
 
 #[cfg(test)]

@@ -20,12 +20,14 @@ pub mod contact;
 pub mod dirichlet;
 pub mod gluing;
 pub mod law;
+pub mod prescribed;
 pub mod ties;
 
 use std::ops::Range;
 
 use thiserror::Error;
 
+use self::prescribed::Parallel;
 use self::ties::Ties;
 
 /// What a row stands for.
@@ -60,13 +62,11 @@ pub struct Term {
     pub value: f64,
 }
 
-/// One row: `sum of terms = rhs`, or `<= rhs` for contact ([`law`]).
+/// One row: `sum of terms = rhs`, or `<= rhs` for contact ([`law`]); see [`Row::right_hand_side`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// What it stands for.
     pub kind: Kind,
-    /// Right-hand side (length, times `scale`).
-    pub rhs: f64,
     /// Factor that gave the row its length: force (force) = `scale` times multiplier, distance (length) = slack / `scale`.
     pub scale: f64,
     /// Length of the row.
@@ -75,6 +75,8 @@ pub struct Row {
     pub terms: Vec<Term>,
     /// Components of a contact's condition that supports fix. They are part of the right-hand side.
     pub fixed: Vec<Fixed>,
+    /// Other contact conditions along the same direction; the right-hand side is that of the tightest.
+    pub parallel: Vec<Parallel>,
 }
 
 /// A component of a contact's condition that a support fixes.
@@ -116,8 +118,8 @@ impl Row {
         let relative = (1.0 / (flexibility * largest)).max(SOFTEST);
         if relative * JUMP <= 1.0 {
             self.length = (0.5 * relative.log2()).round().exp2();
-            self.rhs *= self.length;
             self.scale *= self.length;
+            self.parallel.iter_mut().for_each(|other| other.scale *= self.length);
             self.terms.iter_mut().for_each(|term| term.value *= self.length);
         }
     }
@@ -172,8 +174,8 @@ pub struct Constraints {
     /// Nodes that short edges tie together.
     pub ties: Ties,
     /// Contact pairs of own nodes without a row, as supports fix all their nodes along the normal: index of the pair and the
-    /// distance that is left (length).
-    pub idle: Vec<(usize, f64)>,
+    /// components that they fix.
+    pub idle: Vec<(usize, Vec<Fixed>)>,
 }
 
 /// Why the rows cannot be set up.

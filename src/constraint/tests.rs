@@ -1,5 +1,6 @@
 use faer::Mat;
 
+use super::prescribed::Prescribed;
 use super::{ConstraintError, Constraints, Kind, Row, Support};
 use super::{contact, dirichlet};
 use crate::comm::all_gather_u64;
@@ -146,7 +147,8 @@ fn supports_in_conflict_are_refused_on_every_rank_with_one_message() {
             let [name, value] = ["other", "right"].map(String::from);
             let twin = supports.iter().find(|s| s.name == value).expect("the scene has it");
             supports.push(Support { name, displacement: [0.0, 0.1, 0.5], ..twin.clone() });
-            Constraints::new(setup.comm, &setup.discrete.decomposition, &supports, &[], &[1.0; 100]).err()
+            let interface = &setup.discrete.decomposition.interface;
+            dirichlet::check(setup.comm, interface, &supports, &Prescribed::by(&supports, &[])).err()
         });
         let expected = ConstraintError::Conflict {
             first: "right".into(),
@@ -189,12 +191,13 @@ fn coefficient(row: &Row, node: u64, axis: usize) -> f64 {
 fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_hand_side() {
     let pair = pair(&[(7, 1.0), (6, 0.5)], &[(8, 0.75), (9, 0.75)]);
     let nodes = [node(6, &[3]), node(7, &[0, 3]), node(8, &[1, 2, 4]), node(9, &[2])];
-    let (held, free) = ([Some((0, 0.25)), None, None], [None; 3]);
-    let side = |number: u64, fixed: [Option<(usize, f64)>; 3]| (&nodes[number as usize - 6], fixed);
+    let (held, free) = ([Some(0), None, None], [None; 3]);
+    let at = Prescribed { displacements: vec![[0.25, 0.0, 0.0]], gaps: vec![0.0, 0.0, 0.0, 0.5] };
+    let side = |number: u64, fixed: [Option<usize>; 3]| (&nodes[number as usize - 6], fixed);
     let row = contact::row(3, &pair, |n| side(n, if n % 2 == 1 { held } else { free })).expect("much is free");
     let square: f64 = row.terms.iter().map(|t| t.value * t.value).sum();
     assert!((square - 1.0).abs() < 1e-15);
-    assert!((row.rhs - row.scale * (0.5 - 0.6 * 0.25 + 0.75 * 0.6 * 0.25)).abs() < 1e-15);
+    assert!((row.right_hand_side(&at) - row.scale * (0.5 - 0.6 * 0.25 + 0.75 * 0.6 * 0.25)).abs() < 1e-15);
     let fixed: Vec<_> = row.fixed.iter().map(|h| (h.support, h.axis, h.weight)).collect();
     assert_eq!(fixed, [(0, 0, 0.6), (0, 0, -0.75 * 0.6)]);
     let expected = [
@@ -208,25 +211,32 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
             assert!((coefficient(&row, node, axis) - expected).abs() < 1e-15, "{node} {axis}");
         }
     }
-    let all = [Some((0, 0.1)); 3];
-    let left = contact::row(3, &pair, |n| side(n, all)).unwrap_err();
+    let all = contact::row(3, &pair, |n| side(n, [Some(0); 3])).unwrap_err();
+    let left = Prescribed { displacements: vec![[0.1; 3]], ..at }.distance(3, &all);
     assert!((left - 0.5).abs() < 1e-15, "a common motion leaves the gap: {left}");
 }
 
 #[test]
 fn of_contacts_in_one_direction_the_tightest_counts() {
     let slave = node(7, &[0, 3]);
-    let row = |number: usize, gap: f64, normal: [f64; 3]| {
-        let pair = ContactPair { gap, normal, ..pair(&[(7, 1.0)], &[]) };
+    const GAPS: [f64; 5] = [0.5, -0.5, 0.2, 0.3, 0.1];
+    let at = |gaps: [f64; 5]| Prescribed { displacements: Vec::new(), gaps: gaps.to_vec() };
+    let row = |number: usize, normal: [f64; 3]| {
+        let pair = ContactPair { normal, ..pair(&[(7, 1.0)], &[]) };
         contact::row(number, &pair, |_| (&slave, [None; 3])).expect("it is free")
     };
     let (up, down) = ([0.6, 0.0, 0.8], [-0.6, 0.0, -0.8]);
     let mut rows = Vec::new();
-    for (number, gap, normal) in [(0, 0.5, up), (1, -0.5, down), (2, 0.2, up), (3, 0.3, up), (4, 0.1, [0.0, 0.6, 0.8])]
-    {
-        contact::add_tightest(&mut rows, row(number, gap, normal));
+    for (number, normal) in [up, down, up, up, [0.0, 0.6, 0.8]].into_iter().enumerate() {
+        contact::add_tightest(&mut rows, row(number, normal), &at(GAPS));
     }
-    assert_eq!(rows, [row(2, 0.2, up), row(1, -0.5, down), row(4, 0.1, [0.0, 0.6, 0.8])]);
+    let kinds: Vec<Kind> = rows.iter().map(|row| row.kind).collect();
+    assert_eq!(kinds, [2, 1, 4].map(|pair| Kind::Contact { pair }));
+    let right_hand_sides = |gaps: [f64; 5]| rows.iter().map(|row| row.right_hand_side(&at(gaps))).collect::<Vec<_>>();
+    let scale = rows[0].scale;
+    assert_eq!(right_hand_sides(GAPS), [0.2, -0.5, 0.1].map(|gap| scale * gap));
+    // Another obstacle has come nearest.
+    assert_eq!(right_hand_sides([0.5, -0.5, 0.2, 0.1, 0.1]), [0.1, -0.5, 0.1].map(|gap| scale * gap));
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! Surfaces are two-dimensional, so every rank sees both sides of each contact whole, for the time of the pairing only; what
 //! is kept of it are the pairs.
 
+pub mod areas;
 pub mod clip;
 pub mod corner;
 pub mod dual;

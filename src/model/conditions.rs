@@ -1,24 +1,21 @@
-//! What a scene prescribes at the end of each step of its load history: right-hand sides and nodal loads.
+//! The rows of B of a scene, and their right-hand sides at the end of each step of its load history.
 
 use super::ModelError;
-use super::discrete::Discrete;
-use super::stages::{Conditions, Stage};
-use crate::assembly::loads::{self, Load};
 use crate::comm::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
-use crate::constraint::{ConstraintError, Constraints, Support};
+use crate::constraint::prescribed::Prescribed;
+use crate::constraint::{Constraints, Support, dirichlet};
 use crate::contact::{ContactError, ContactPair};
 use crate::decomposition::Decomposition;
-use crate::feti::Torn;
 use crate::scene::{Contact, Scene, Step};
 use crate::vector::dot;
 
 /// Right-hand sides of a rank's rows.
 pub struct RightHandSides {
     /// At rest: contact gaps are there, prescribed displacements are not.
-    begin: Vec<f64>,
+    pub begin: Vec<f64>,
     /// At the end of each step.
-    ends: Vec<Vec<f64>>,
+    pub ends: Vec<Vec<f64>>,
 }
 
 /// What the rows are made of.
@@ -40,57 +37,74 @@ pub(super) struct Given<'a> {
 pub(super) fn constraints(
     scene: &Scene,
     comm: &dyn Comm,
-    &Given { decomposition, supports, contacts, pairs, stiffness }: &Given,
+    given: &Given,
 ) -> Result<(Constraints, RightHandSides), ModelError> {
-    // At rest without a step.
-    let rows = |step: Option<&Step>| {
-        let factor = |s: &Support| step.map_or(0.0, |step| step.of_support(&s.name));
-        let scaled = |s: &Support| Support { displacement: s.displacement.map(|d| factor(s) * d), ..s.clone() };
-        let supports: Vec<Support> = supports.iter().map(scaled).collect();
-        let pairs: Vec<ContactPair> = pairs.iter().map(|pair| moved(scene, pair, step)).collect();
-        let rows: Result<_, ConstraintError> = Constraints::new(comm, decomposition, &supports, &pairs, stiffness);
-        let rows = agree(comm, "supports", rows).map_err(ModelError::Supports)?;
-        refuse_held(comm, contacts, &pairs, &rows)?;
-        Ok::<_, ModelError>(rows)
+    let &Given { decomposition, supports, contacts, pairs, stiffness } = given;
+    let agreed = |at: &Prescribed| {
+        let outcome = dirichlet::check(comm, &decomposition.interface, supports, at);
+        agree(comm, "supports", outcome).map_err(ModelError::Supports)
     };
-    let right_hand_sides = |rows: &Constraints| rows.rows.iter().map(|row| row.rhs).collect::<Vec<f64>>();
     let steps = scene.steps();
-    let constraints = rows(Some(&steps[0]))?;
-    let first = right_hand_sides(&constraints);
+    let at = given.prescribed(scene, Some(&steps[0]));
+    agreed(&at)?;
+    let constraints = Constraints::new(comm, decomposition, supports, pairs, stiffness, &at);
+    refuse_held(comm, contacts, pairs, &constraints.idle_distances(&at))?;
+    let first = constraints.right_hand_sides(&at);
+
     let displacements = supports.iter().map(|s| s.displacement);
     let mut displacements = displacements.chain(scene.contact.values().map(Contact::displacement));
     if scene.step.is_empty() || displacements.all(|displacement| displacement == [0.0; 3]) {
         let (begin, ends) = (first.clone(), vec![first; steps.len()]);
         return Ok((constraints, RightHandSides { begin, ends }));
     }
-    let begin = right_hand_sides(&rows(None)?);
+    let right_hand_sides = |step: Option<&Step>| {
+        let at = given.prescribed(scene, step);
+        agreed(&at)?;
+        refuse_held(comm, contacts, pairs, &constraints.idle_distances(&at))?;
+        Ok::<_, ModelError>(constraints.right_hand_sides(&at))
+    };
+    let begin = right_hand_sides(None)?;
     let mut ends = vec![first];
     for step in &steps[1..] {
-        ends.push(right_hand_sides(&rows(Some(step))?));
+        ends.push(right_hand_sides(Some(step))?);
     }
     Ok((constraints, RightHandSides { begin, ends }))
 }
 
-/// A pair whose obstacle is where it is at the end of a step, or at rest: the plane that a node keeps clear of goes along.
-fn moved(scene: &Scene, pair: &ContactPair, step: Option<&Step>) -> ContactPair {
-    let (name, contact) = scene.contact.iter().nth(pair.contact).expect("a pair belongs to a contact");
-    let mut pair = pair.clone();
-    let away = dot(pair.normal, contact.displacement());
-    pair.widen(away * step.map_or(0.0, |step| step.of_contact(name)));
-    pair
+impl Given<'_> {
+    /// What is prescribed at the end of a step, or at rest without one. The gap to an obstacle changes by the obstacle's motion
+    /// along the normal.
+    fn prescribed(&self, scene: &Scene, step: Option<&Step>) -> Prescribed {
+        let of_support = |s: &Support| {
+            let factor = step.map_or(0.0, |step| step.of_support(&s.name));
+            s.displacement.map(|d| factor * d)
+        };
+        let obstacles = scene.contact.iter();
+        let obstacles: Vec<([f64; 3], f64)> = obstacles
+            .map(|(name, contact)| (contact.displacement(), step.map_or(0.0, |step| step.of_contact(name))))
+            .collect();
+        let gap = |pair: &ContactPair| {
+            let (displacement, factor) = obstacles[pair.contact];
+            pair.gap + dot(pair.normal, displacement) * factor
+        };
+        Prescribed {
+            displacements: self.supports.iter().map(of_support).collect(),
+            gaps: self.pairs.iter().map(gap).collect(),
+        }
+    }
 }
 
 /// Overlap, in diameters of a slave node's share of the surface, that may remain where supports hold both sides.
 const HELD_OVERLAP: f64 = 1e-6;
 
-/// Refuses contacts that supports violate. Collective.
+/// Refuses contacts that supports violate, given the distances that are left on this rank, by pair. Collective.
 fn refuse_held(
     comm: &dyn Comm,
     names: &[String],
     pairs: &[ContactPair],
-    constraints: &Constraints,
+    distances: &[(usize, f64)],
 ) -> Result<(), ContactError> {
-    let mine: Vec<u64> = constraints.idle.iter().flat_map(|&(pair, left)| [pair as u64, left.to_bits()]).collect();
+    let mine: Vec<u64> = distances.iter().flat_map(|&(pair, left)| [pair as u64, left.to_bits()]).collect();
     let all = all_gather_u64(comm, &mine);
     let mut depths: Vec<(usize, f64)> =
         all.chunks_exact(2).map(|idle| (idle[0] as usize, -f64::from_bits(idle[1]))).collect();
@@ -102,24 +116,4 @@ fn refuse_held(
     let of_contact = || depths.iter().filter(|(pair, _)| pairs[*pair].contact == contact);
     let depth = of_contact().fold(0.0_f64, |deepest, (_, depth)| deepest.max(*depth));
     Err(ContactError::Held { name: names[contact].clone(), nodes: of_contact().count(), depth })
-}
-
-/// What is prescribed at the beginning, and the stages from there; `zeros` are those of a torn vector.
-pub fn stages(scene: &Scene, discrete: &Discrete, zeros: &dyn Fn() -> Torn) -> (Conditions, Vec<Stage>) {
-    let RightHandSides { begin, ends } = &discrete.right_hand_sides;
-    let loads = |factor: &dyn Fn(&str) -> f64| {
-        let scaled = |(load, name): (&Load, &String)| load.times(factor(name));
-        let scaled: Vec<Load> = discrete.loads.iter().zip(scene.load.keys()).map(scaled).collect();
-        let mut loads = zeros();
-        for (subdomain, f) in discrete.decomposition.subdomains.iter().zip(&mut loads) {
-            loads::add(subdomain, &scaled, f);
-        }
-        loads
-    };
-    let stages = scene.steps().iter().zip(ends).map(|(step, rhs)| Stage {
-        end: Conditions { loads: loads(&|name| step.of_load(name)), rhs: rhs.clone() },
-        increments: step.increments,
-        halvings: step.halvings,
-    });
-    (Conditions { loads: zeros(), rhs: begin.clone() }, stages.collect())
 }

@@ -1,16 +1,14 @@
 //! Whether supports, contacts and loads hold all bodies: known before anything is factorised.
 
 use super::ModelError;
-use super::conditions;
 use super::discrete::Discrete;
-use super::stages::Stage;
+use super::history::{self, Stage};
 use crate::comm::Comm;
+use crate::feti::Interconnection;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::equilibrium::Unheld;
 use crate::feti::coarse::{equilibrium, recover};
-use crate::feti::dual::gather::Gather;
 use crate::feti::dual::space::RowSpace;
-use crate::feti::inverse::kernel;
 use crate::feti::inverse::kernel::RigidModes;
 use crate::scene::Scene;
 
@@ -20,13 +18,10 @@ use crate::scene::Scene;
 /// If there is one.
 pub fn held(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Result<(), ModelError> {
     let Discrete { decomposition, constraints, .. } = discrete;
-    let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains[..]);
-    let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(|s| s.dofs()).collect());
-    let space = RowSpace::new(comm, shares, constraints);
-    let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
-    let mut coarse = Coarse::new(comm, &decomposition.clusters, subdomains, &modes, constraints, &gather);
-    let (_, stages) = conditions::stages(scene, discrete, &|| gather.zeros());
-    at_all_stages(scene, discrete, &mut coarse, &space, &modes, &stages)
+    let connection = Interconnection::new(comm, decomposition, constraints);
+    let mut coarse = connection.coarse(comm, decomposition, constraints);
+    let (_, stages) = history::stages(scene, discrete, &|| connection.gather.zeros());
+    at_all_stages(scene, discrete, &mut coarse, &connection.space, &connection.modes, &stages)
 }
 
 /// As [`held`], with what solving needs too. Leaves the coarse problem factorised. Collective.

@@ -1,8 +1,8 @@
 //! From a scene to its discrete problem: meshes, subdomains, contact conditions, rows of B and loads.
 //!
-//! [`bodies`] reads and makes the meshes, [`contacts`] pairs the surfaces, [`conditions`] has the rows and what changes over the load
-//! history, [`extent`] measures bodies and places,
-//! [`discrete`] joins all to the problem of one rank. [`stages`] are the load steps, [`held`] tells whether anything moves freely.
+//! [`bodies`] reads and makes the meshes, [`contacts`] pairs the surfaces, [`conditions`] makes the rows and their right-hand
+//! sides, [`extent`] measures bodies and places, [`discrete`] joins all to the problem of one rank. [`history`] has loads and
+//! right-hand sides of each load step, [`held`] tells whether anything moves freely.
 
 pub mod bodies;
 pub mod conditions;
@@ -10,7 +10,7 @@ pub mod contacts;
 pub mod discrete;
 pub mod extent;
 pub mod held;
-pub mod stages;
+pub mod history;
 
 pub use discrete::{Discrete, discretise, discretise_expecting};
 

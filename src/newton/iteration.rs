@@ -16,7 +16,7 @@ use super::residuals::Residuals;
 use super::snapshot::{Reached, Snapshot};
 use super::step::{SolverState, Step, StepSolver};
 use crate::feti::Torn;
-use crate::model::stages::{Conditions, Stage};
+use crate::model::history::{Conditions, Stage};
 use crate::monitor::timing::Timer;
 use crate::qp;
 

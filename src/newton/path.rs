@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::stages::{Conditions, Stage};
+use crate::model::history::{Conditions, Stage};
 
 /// What is prescribed at the beginning, and the stages from there: at least one.
 pub struct Path {

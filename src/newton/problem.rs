@@ -9,14 +9,14 @@ use crate::assembly::internal::{self, Terms};
 use crate::constraint::Constraints;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
-use crate::feti::Torn;
 use crate::feti::dual::coupling::Coupling;
 use crate::feti::dual::gather::Gather;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::RigidModes;
+use crate::feti::{Interconnection, Torn};
 use crate::material::{Law, Material};
 use crate::model::Discrete;
-use crate::model::stages::Conditions;
+use crate::model::history::Conditions;
 
 /// What one rank holds of the problem.
 pub struct TornProblem<'a> {
@@ -72,10 +72,8 @@ impl<'a> TornProblem<'a> {
     /// Of a discrete problem, with what is prescribed now; nothing is committed yet.
     pub fn new(
         discrete: &'a Discrete,
-        gather: &'a Gather<'a>,
-        space: &'a RowSpace<'a>,
+        Interconnection { gather, space, modes }: &'a Interconnection<'a>,
         sums: &'a NodeSums<'a>,
-        modes: &'a [RigidModes],
         Conditions { loads, rhs }: Conditions,
     ) -> Self {
         let Discrete { materials, constraints, bodies, .. } = discrete;

@@ -33,7 +33,7 @@ pub struct NewtonRow {
     pub step: u64,
     /// The paper's stopping criterion in the energy norm.
     pub criterion: f64,
-    /// Relative residual of the equilibrium.
+    /// The largest relative residual: of equilibrium, gluing, gap and complementarity.
     pub residual: f64,
     /// Length of the step taken, 1 is Newton's own.
     pub damping: f64,

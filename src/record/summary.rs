@@ -33,7 +33,7 @@ pub struct Summary {
     pub plastic_fraction: Option<f64>,
     /// Newton steps.
     pub newton_iterations: Option<u64>,
-    /// QP solver: smalse-m or active-set.
+    /// QP solver: smalse-m or active-set; pcpg (conjugate gradients) without contact.
     pub qp: String,
     /// Work done by the QP solver.
     #[serde(flatten)]

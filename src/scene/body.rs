@@ -127,6 +127,13 @@ pub struct Gmsh {
     pub translate: [f64; 3],
 }
 
+impl Gmsh {
+    /// Names of the volumes; none stands for the only one in the file.
+    pub fn volumes(&self) -> &[String] {
+        self.volume.as_ref().map_or(&[], Volumes::names)
+    }
+}
+
 fn one() -> f64 {
     1.0
 }

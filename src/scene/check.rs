@@ -3,24 +3,21 @@
 //! The first fault ends the check. What needs geometry (whether contact surfaces face each other) or a mesh is checked
 //! by the rooms that have them.
 
-use std::fmt::Debug;
-
+use super::Fault;
 use super::Scene;
 use super::body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
 use super::contact::{Contact, Sides};
 use super::decomposition::Method;
-use super::error::Fault;
 use super::held::Held;
 use super::initial::Initial;
 use super::load::Load;
 use super::mapped::{OF_CYLINDER, OF_SPHERE};
+use super::require::{Checked, all_finite, known, names, require, whole};
 use super::solver::Solver;
 use super::step::Step;
 use super::surface::{Face, Support, SurfaceName};
 use super::volumes;
 use crate::material::{BadParameter, Law, Material};
-
-pub(super) type Checked = Result<(), Fault>;
 
 /// The first fault of a scene, in the order of its sections.
 pub(super) fn scene(scene: &Scene) -> Checked {
@@ -40,27 +37,6 @@ pub(super) fn scene(scene: &Scene) -> Checked {
     scene.body.keys().try_for_each(|name| holding(scene, name))
 }
 
-/// Passes if `holds`; else the fault reads `key = value: rule`.
-pub(super) fn require(holds: bool, key: &str, value: impl Debug, rule: impl Into<String>) -> Checked {
-    if holds {
-        Ok(())
-    } else {
-        Err(Fault { key: key.to_owned(), value: Some(format!("{value:?}")), rule: rule.into() })
-    }
-}
-
-fn whole(key: &str, rule: impl Into<String>) -> Fault {
-    Fault { key: key.to_owned(), value: None, rule: rule.into() }
-}
-
-pub(super) fn all_finite(key: &str, values: &[f64]) -> Checked {
-    require(values.iter().all(|value| value.is_finite()), key, values, "must be finite numbers")
-}
-
-fn names<'a>(known: impl Iterator<Item = &'a String>) -> String {
-    known.map(String::as_str).collect::<Vec<_>>().join(", ")
-}
-
 fn material(key: &str, material: &Material) -> Checked {
     let fault = |BadParameter { name, value, rule }| Fault {
         key: format!("{key}.{name}"),
@@ -71,7 +47,8 @@ fn material(key: &str, material: &Material) -> Checked {
 }
 
 fn body(scene: &Scene, key: &str, body: &Body) -> Checked {
-    volumes::check(&scene.material, key, body)?;
+    let volumes = body.gmsh().and_then(|gmsh| gmsh.volume.as_ref());
+    volumes::check(&scene.material, key, volumes, &body.material)?;
     match &body.shape {
         Shape::Brick(it) => brick(key, it),
         Shape::Gmsh(it) => gmsh(&format!("{key}.gmsh"), it),
@@ -245,14 +222,6 @@ fn step(scene: &Scene, key: &str, step: &Step) -> Checked {
         finite(&key, factor)?;
     }
     Ok(())
-}
-
-/// What to say of a name that is not among those of a section.
-pub(super) fn known<'a>(section: &str, known: impl Iterator<Item = &'a String>) -> String {
-    match names(known) {
-        none if none.is_empty() => format!("no such {section}: the scene has none"),
-        known => format!("no such {section}: known are {known}"),
-    }
 }
 
 fn decomposition(scene: &Scene) -> Checked {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{Checked, all_finite, require};
+use super::require::{Checked, all_finite, require};
 use super::surface::SurfaceName;
 
 /// A contact. Each slave node carries one condition.

@@ -106,3 +106,16 @@ impl fmt::Display for Fault {
         }
     }
 }
+
+/// A message of the TOML reader on one line, without the vocabulary of Rust types.
+pub(super) fn in_user_words(message: &str) -> String {
+    let words = [
+        ("unknown field", "unknown key"),
+        ("missing field", "missing key"),
+        ("expected usize", "expected a count (0, 1, 2, ...)"),
+        ("expected f64", "expected a number"),
+        ("expected fewer elements in array", "expected fewer values"),
+        ("\n", ", "),
+    ];
+    words.iter().fold(message.trim_end().to_owned(), |text, (from, to)| text.replace(from, to))
+}

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{Checked, require};
+use super::require::{Checked, require};
 
 /// An octant of a hollow sphere about the origin, where all coordinates are positive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -21,6 +21,7 @@ mod load;
 mod mapped;
 mod overrides;
 mod read;
+mod require;
 mod solver;
 mod step;
 mod surface;
@@ -85,7 +86,7 @@ pub struct Scene {
 
 impl Scene {
     /// The scene of this built-in name or file, with `sets` (each `dotted.path=value`) applied and the cells per edge
-    /// of every brick multiplied by `level`.
+    /// of every body that is not from a mesh file multiplied by `level`.
     ///
     /// # Errors
     /// An unknown name, an unreadable file, bad TOML, an override that does not fit, or a failed check, with its place.
@@ -176,6 +177,11 @@ impl Scene {
         let supports = self.support.values().map(|s| &s.surface);
         let loads = self.load.values().filter_map(Load::surface);
         supports.chain(loads).chain(self.contact.values().flat_map(Contact::surfaces))
+    }
+
+    /// Whether every body is a brick: only bricks have coarser levels that a solution can be passed on from.
+    pub fn is_of_bricks(&self) -> bool {
+        self.body.values().all(|body| body.brick().is_some())
     }
 
     /// Whether a body takes part in a contact.

@@ -6,7 +6,7 @@
 
 use toml::{Table, Value};
 
-use super::read::in_user_words;
+use super::error::in_user_words;
 use super::{Scene, SceneError};
 
 /// Sections whose entries have names of the user's choice.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use toml::Table;
 use toml::de::{DeArray, DeTable};
 
-use super::error::{Place, SceneError};
+use super::error::{Place, SceneError, in_user_words};
 use super::{Scene, overrides};
 
 /// Reads the text and applies the overrides; nothing is checked but form and types.
@@ -47,19 +47,6 @@ pub(super) fn text(bytes: Vec<u8>, origin: &str) -> Result<String, SceneError> {
         (_, Err(error)) => Err(no_text(&error.as_bytes()[..error.utf8_error().valid_up_to()])),
         (Some(at), Ok(text)) => Err(no_text(&text.as_bytes()[..at])),
     }
-}
-
-/// A message of the TOML reader on one line, without the vocabulary of Rust types.
-pub(super) fn in_user_words(message: &str) -> String {
-    let words = [
-        ("unknown field", "unknown key"),
-        ("missing field", "missing key"),
-        ("expected usize", "expected a count (0, 1, 2, ...)"),
-        ("expected f64", "expected a number"),
-        ("expected fewer elements in array", "expected fewer values"),
-        ("\n", ", "),
-    ];
-    words.iter().fold(message.trim_end().to_owned(), |text, (from, to)| text.replace(from, to))
 }
 
 /// Where a dotted key got its value: an override, or the nearest line of the text.

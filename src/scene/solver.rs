@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Solver {
     /// Newton stops when the step is this small in the elastic energy norm (the paper's criterion) ...
     pub newton_tolerance: f64,
-    /// ... and the true residual of the nonlinear problem is this small too.
+    /// ... and the largest true residual of the nonlinear problem (equilibrium, gluing, gap, complementarity) is this small too.
     pub residual_tolerance: f64,
     /// Newton stops, whatever these say, when the algebraic error is at most this share of the discretisation error. Without it
     /// they decide.

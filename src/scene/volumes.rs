@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, Gmsh};
-use super::check::{Checked, known, require};
+use super::require::{Checked, known, require};
 use crate::material::Material;
 
 /// Physical volumes that make a body, by name, or by number where they have none.
@@ -28,13 +27,12 @@ pub enum Materials {
     Each(BTreeMap<String, String>),
 }
 
-impl Gmsh {
-    /// Names of the volumes; none stands for the only one in the file.
-    pub fn volumes(&self) -> &[String] {
-        match &self.volume {
-            None => &[],
-            Some(Volumes::One(name)) => std::slice::from_ref(name),
-            Some(Volumes::Several(names)) => names,
+impl Volumes {
+    /// Their names.
+    pub fn names(&self) -> &[String] {
+        match self {
+            Self::One(name) => std::slice::from_ref(name),
+            Self::Several(names) => names,
         }
     }
 }
@@ -58,19 +56,24 @@ impl Materials {
 }
 
 /// Whether a body's volumes are named once and all have a material.
-pub(super) fn check(materials: &BTreeMap<String, Material>, key: &str, body: &Body) -> Checked {
+pub(super) fn check(
+    known_materials: &BTreeMap<String, Material>,
+    key: &str,
+    volumes: Option<&Volumes>,
+    materials: &Materials,
+) -> Checked {
     let exists = |key: &str, name: &String| {
-        require(materials.contains_key(name), key, name, known("material", materials.keys()))
+        require(known_materials.contains_key(name), key, name, known("material", known_materials.keys()))
     };
-    let volumes = body.gmsh().map_or(&[][..], Gmsh::volumes);
-    if let Some(Volumes::Several(names)) = body.gmsh().and_then(|gmsh| gmsh.volume.as_ref()) {
+    if let Some(Volumes::Several(names)) = volumes {
         let key = format!("{key}.gmsh.volume");
         require(!names.is_empty(), &key, names, "name at least one volume")?;
         let once = names.iter().collect::<BTreeSet<_>>().len() == names.len();
         require(once, &key, names, "name each volume once")?;
     }
+    let volumes = volumes.map_or(&[][..], Volumes::names);
     let key = format!("{key}.material");
-    let of_volumes = match &body.material {
+    let of_volumes = match materials {
         Materials::Whole(name) => return exists(&key, name),
         Materials::Each(of_volumes) => of_volumes,
     };

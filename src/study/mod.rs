@@ -21,9 +21,9 @@ use thiserror::Error;
 
 use self::recorder::Recorder;
 use self::report::{convergence, loss_of_accuracy, newton_row, place, summarise};
-use self::solver::SetUp;
 use crate::comm::Comm;
-use crate::feti::Torn;
+use crate::decomposition::sums::NodeSums;
+use crate::feti::{Interconnection, Torn};
 use crate::material::History;
 use crate::model::{self, Discrete, ModelError};
 use crate::monitor::events::Event;
@@ -107,11 +107,12 @@ pub fn solve(
     watcher: &mut dyn Watcher,
 ) -> Result<Solved, StudyError> {
     let started = SystemTime::now();
-    let (set_up, coarse) = SetUp::new(discrete, comm, timer);
-    let (conditions, stages) = model::conditions::stages(scene, discrete, &|| set_up.gather.zeros());
-    let solver = solver::step_solver(scene, discrete, comm, &set_up, (coarse, &stages), timer)?;
-    let mut problem =
-        TornProblem::new(discrete, &set_up.gather, &set_up.space, &set_up.sums, &set_up.modes, conditions);
+    let Discrete { decomposition, constraints, .. } = discrete;
+    let connection = Interconnection::new(comm, decomposition, constraints);
+    let sums = NodeSums::new(comm, decomposition);
+    let (conditions, stages) = model::history::stages(scene, discrete, &|| connection.gather.zeros());
+    let solver = solver::step_solver(scene, discrete, comm, &connection, &stages, timer)?;
+    let mut problem = TornProblem::new(discrete, &connection, &sums, conditions);
     let mut recorder = Recorder::new(scene, discrete, comm);
     let begin = enter(begin, &mut problem, &mut recorder);
     let settings = solver::settings(scene);
@@ -123,9 +124,8 @@ pub fn solve(
     let (problem, u) = newton.finish();
     let meshes = restart::meshes::meshes(comm, scene, discrete);
     let mesh_names = serde_json::to_string(&meshes).expect("names and numbers can be written");
-    let shares = &discrete.decomposition.shares;
     let records = Records {
-        provenance: provenance::collect(comm, &scene.to_toml(), &mesh_names, shares, started),
+        provenance: provenance::collect(comm, &scene.to_toml(), &mesh_names, &decomposition.shares, started),
         convergence: convergence(&summary.newton),
         state: restart::state::pack(&problem, meshes),
     };

@@ -1,55 +1,23 @@
 //! The solver of a scene's Newton steps: FETI set up on the subdomains of a rank, as the scene's settings want it.
 
 use crate::comm::Comm;
-use crate::decomposition::Subdomain;
-use crate::decomposition::sums::NodeSums;
 use crate::decomposition::twins::{alike, twins};
-use crate::feti::coarse::Coarse;
+use crate::feti::Interconnection;
 use crate::feti::coarse::projector::Projector;
-use crate::feti::dual::gather::Gather;
 use crate::feti::dual::operator::DualOperator;
-use crate::feti::dual::space::RowSpace;
 use crate::feti::dual::supported;
 use crate::feti::inverse::factor::{Factors, analyse};
 use crate::feti::inverse::hybrid::Hybrid;
-use crate::feti::inverse::kernel::{self, RigidModes};
 use crate::feti::inverse::schur::Schur;
 use crate::feti::preconditioner::Preconditioner;
 use crate::feti::preconditioner::deluxe::Deluxe;
-use crate::model::stages::Stage;
+use crate::model::history::Stage;
 use crate::model::{self, Discrete, ModelError};
 use crate::monitor::timing::Timer;
 use crate::newton::{Method, ProgramSettings, Settings, StepSolver};
 use crate::qp::mprgp::Expansion;
 use crate::scene::{self, Scene};
 use crate::sparse::cholesky::Precision;
-
-/// What the torn problem and its solver share.
-pub(super) struct SetUp<'a> {
-    /// B.
-    pub gather: Gather<'a>,
-    /// Inner products of multipliers.
-    pub space: RowSpace<'a>,
-    /// Sums around nodes.
-    pub sums: NodeSums<'a>,
-    /// R, of each own subdomain's cluster.
-    pub modes: Vec<RigidModes>,
-}
-
-impl<'a> SetUp<'a> {
-    /// For a discrete problem, with its coarse problem. Collective.
-    pub fn new(discrete: &'a Discrete, comm: &'a dyn Comm, timer: &Timer) -> (Self, Coarse<'a>) {
-        let Discrete { decomposition, constraints, .. } = discrete;
-        let (shares, subdomains) = (&decomposition.shares, &decomposition.subdomains[..]);
-        let gather = Gather::new(comm, shares, constraints, subdomains.iter().map(Subdomain::dofs).collect());
-        let space = RowSpace::new(comm, shares, constraints);
-        let sums = NodeSums::new(comm, decomposition);
-        let modes = kernel::of_clusters(decomposition.clusters.of_rank(comm.rank()), subdomains);
-        let coarse = || Coarse::new(comm, &decomposition.clusters, subdomains, &modes, constraints, &gather);
-        let coarse = timer.time("coarse set-up", coarse);
-        (Self { gather, space, sums, modes }, coarse)
-    }
-}
 
 /// The solver, before anything is factorised but the coarse problem. Collective.
 ///
@@ -59,13 +27,14 @@ pub(super) fn step_solver<'a>(
     scene: &Scene,
     discrete: &'a Discrete,
     comm: &'a dyn Comm,
-    set_up: &'a SetUp,
-    (mut coarse, stages): (Coarse<'a>, &[Stage]),
+    connection: &'a Interconnection,
+    stages: &[Stage],
     timer: &Timer,
 ) -> Result<StepSolver<'a>, ModelError> {
     let Discrete { decomposition, constraints, .. } = discrete;
-    let SetUp { gather, space, modes, .. } = set_up;
+    let Interconnection { gather, space, modes } = connection;
     let (subdomains, clusters) = (&decomposition.subdomains[..], &decomposition.clusters);
+    let mut coarse = timer.time("coarse set-up", || connection.coarse(comm, decomposition, constraints));
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
     let precision = match scene.solver.precision {
         scene::Precision::Mixed => Precision::Single,

@@ -52,6 +52,17 @@ fn ranks_change_no_bit_of_it() {
     assert_eq!((bits(warm(2)), bits(&solve(3, 2, "on"))), (alone, alone));
 }
 
+/// Bodies that are no bricks have no coarser level to start from: they are solved at once.
+#[test]
+fn only_bricks_have_it() {
+    let cells = ["inner", "outer"].map(|body| format!("body.{body}.sphere.cells=[2, 1]"));
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/precision/nested-spheres.toml");
+    for way in ["auto", "on"] {
+        let run = solve_with(2, scene, 2, &[&cells[0], &cells[1]], &["--cascade", way]);
+        assert_eq!(run.converged().summary()["cascade"].as_array().unwrap().len(), 0, "{way}");
+    }
+}
+
 #[test]
 fn it_is_on_where_the_problem_is_not_linear() {
     for scene in ["patch", "shear"] {

@@ -16,7 +16,8 @@ use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, WIDTH, Workspa
 use crate::sparse::ordering::nested_dissection;
 use crate::sparse::pattern::Pattern;
 
-/// Number of fixing nodes: as many as a box has corners.
+/// Number of fixing nodes: well-spread ones, see [`fixing_nodes`]. Three that are not on a line hold a body; the fourth is off
+/// their plane.
 const FIXING_NODES: usize = 4;
 /// Error that a factor in single precision may make.
 const PROBE: f64 = 1e-3;

@@ -6,6 +6,7 @@
 //! follows what is there, not what is announced.
 
 pub mod error;
+mod groups;
 mod kind;
 mod nodes;
 mod sections;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::Msh;
 use super::error::Problem;
-use super::volume::{higher_order, listed};
+use super::groups::{higher_order, listed};
 use crate::mesh::faces::{Neighbours, key};
 use crate::mesh::solid::{NamedSurface, SolidMesh};
 use crate::mesh::split;

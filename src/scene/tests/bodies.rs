@@ -3,6 +3,15 @@
 use super::*;
 
 #[test]
+fn a_scene_of_bricks_has_no_other_body() {
+    let brick = "brick = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }";
+    let sphere = ONE.replace(brick, "sphere = { inner = 1, outer = 2, cells = [1, 1] }").replace("zmin", "z0");
+    let sphere = sphere.replace("cells = [2, 2, 2]", "method = \"metis\"");
+    assert!(one(&[]).unwrap().is_of_bricks());
+    assert!(!Scene::from_text(&sphere, "one.toml", 1, &[]).unwrap().is_of_bricks());
+}
+
+#[test]
 fn materials_are_checked() {
     for young in ["0", "-1.0", "nan", "inf"] {
         refuses(&[&format!("material.steel.young={young}")], &["material.steel.young = "]);
