@@ -8,10 +8,10 @@ import math
 
 from . import measure
 from .measure import RESULTS
+from .deal_ii import forces_of_deal_ii, limit_of_deal_ii
 from .pages import table
 
 RAW = measure.RAW / "accuracy"
-DEAL_II = RESULTS / "deal.II-step-42.json"
 CASES = ["ring", "spheres", "patch", "hertz", "step-42"]
 
 
@@ -36,18 +36,6 @@ def run(arguments):
             records.add(record)
             print(json.dumps({key: record[key] for key in ("study", "family", "mesh", "errors")}), flush=True)
     return 0
-
-
-def forces_of_deal_ii():
-    """On the whole ball in deal.II's adaptive cycles: of linear and of quadratic elements."""
-    cycles = json.loads(DEAL_II.read_text())["cycles"]
-    return [cycle["contact_force"] for cycle in cycles]
-
-
-def limit_of_deal_ii():
-    """Where those of linear elements go, by Aitken's rule from the last three."""
-    a, b, c = forces_of_deal_ii()[0][-3:]
-    return c - (c - b) ** 2 / ((c - b) - (b - a))
 
 
 HEAD = """\

@@ -11,7 +11,7 @@ import tempfile
 import h5py
 import numpy as np
 
-from .accuracy import limit_of_deal_ii
+from .deal_ii import limit_of_deal_ii
 from .measure import ROOT
 
 

@@ -11,6 +11,7 @@
 
 pub mod balance;
 pub mod certificate;
+mod commit;
 pub mod committed;
 pub mod damping;
 pub mod dual;
