@@ -59,21 +59,31 @@ pub fn library() -> String {
     mpi::environment::library_version().unwrap_or_default().lines().next().unwrap_or_default().trim().to_owned()
 }
 
-/// MPI counts lengths in C ints.
-fn as_mpi(counts: &[usize]) -> Vec<i32> {
-    counts.iter().map(|&n| i32::try_from(n).expect("a message holds fewer than 2^31 numbers")).collect()
+/// Blocks laid one behind the other, in the C ints that MPI counts in.
+struct Blocks {
+    lengths: Vec<i32>,
+    begins: Vec<i32>,
+    total: usize,
 }
 
-/// Displacements of blocks of the given lengths laid one behind the other.
-fn displacements(counts: &[i32]) -> Vec<i32> {
-    counts
-        .iter()
-        .scan(0, |end, &count| {
-            let begin = *end;
-            *end += count;
-            Some(begin)
-        })
-        .collect()
+impl Blocks {
+    /// Blocks of these lengths of `what`.
+    ///
+    /// # Panics
+    /// If there are 2^31 numbers or more in all: MPI cannot count them.
+    fn new(what: &str, lengths: &[usize]) -> Self {
+        let total: usize = lengths.iter().sum();
+        assert!(
+            i32::try_from(total).is_ok(),
+            "{what}: {total} numbers in one message, and MPI counts to {}; take fewer subdomains or a coarser mesh",
+            i32::MAX
+        );
+        let mut end = 0;
+        let mut begin = |&length: &i32| std::mem::replace(&mut end, end + length);
+        // None is longer than all together.
+        let lengths: Vec<i32> = lengths.iter().map(|&length| length as i32).collect();
+        Self { begins: lengths.iter().map(&mut begin).collect(), lengths, total }
+    }
 }
 
 impl Comm for World {
@@ -100,10 +110,9 @@ impl Comm for World {
     }
 
     fn all_gather(&self, mine: &[f64], counts: &[usize]) -> Vec<f64> {
-        let counts = as_mpi(counts);
-        let mut all = vec![0.0; counts.iter().sum::<i32>() as usize];
-        let begins = displacements(&counts);
-        self.world.all_gather_varcount_into(mine, &mut PartitionMut::new(&mut all[..], &counts[..], &begins[..]));
+        let Blocks { lengths, begins, total } = Blocks::new("numbers of all ranks, on all", counts);
+        let mut all = vec![0.0; total];
+        self.world.all_gather_varcount_into(mine, &mut PartitionMut::new(&mut all[..], &lengths[..], &begins[..]));
         all
     }
 
@@ -113,10 +122,9 @@ impl Comm for World {
             root.gather_varcount_into(mine);
             return Vec::new();
         }
-        let counts = as_mpi(counts);
-        let mut all = vec![0.0; counts.iter().sum::<i32>() as usize];
-        let begins = displacements(&counts);
-        root.gather_varcount_into_root(mine, &mut PartitionMut::new(&mut all[..], &counts[..], &begins[..]));
+        let Blocks { lengths, begins, total } = Blocks::new("numbers of all ranks, on the first", counts);
+        let mut all = vec![0.0; total];
+        root.gather_varcount_into_root(mine, &mut PartitionMut::new(&mut all[..], &lengths[..], &begins[..]));
         all
     }
 
@@ -125,20 +133,40 @@ impl Comm for World {
     }
 
     fn all_to_all(&self, outgoing: Vec<Vec<u64>>) -> Vec<Vec<u64>> {
-        let sent = as_mpi(&outgoing.iter().map(Vec::len).collect::<Vec<_>>());
-        let mut received = vec![0; self.size()];
-        self.world.all_to_all_into(&sent[..], &mut received[..]);
+        let sent = Blocks::new("what a rank sends", &outgoing.iter().map(Vec::len).collect::<Vec<_>>());
+        let mut lengths = vec![0_i32; self.size()];
+        self.world.all_to_all_into(&sent.lengths[..], &mut lengths[..]);
+        let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
+        let received = Blocks::new("what a rank receives", &lengths);
         let data = outgoing.concat();
-        let mut all = vec![0_u64; received.iter().sum::<i32>() as usize];
-        let (begins, ends) = (displacements(&sent), displacements(&received));
+        let mut all = vec![0_u64; received.total];
         self.world.all_to_all_varcount_into(
-            &Partition::new(&data[..], &sent[..], &begins[..]),
-            &mut PartitionMut::new(&mut all[..], &received[..], &ends[..]),
+            &Partition::new(&data[..], &sent.lengths[..], &sent.begins[..]),
+            &mut PartitionMut::new(&mut all[..], &received.lengths[..], &received.begins[..]),
         );
-        received.iter().zip(ends).map(|(&count, at)| all[at as usize..(at + count) as usize].to_vec()).collect()
+        let mut all = &all[..];
+        lengths.iter().map(|&length| all.split_off(..length).expect("every block is counted").to_vec()).collect()
     }
 
     fn raw_mpi(&self) -> Option<RawMpi> {
         Some(self.world.as_raw())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_lie_one_behind_the_other() {
+        let Blocks { lengths, begins, total } = Blocks::new("numbers", &[2, 0, 3]);
+        assert_eq!((lengths, begins, total), (vec![2, 0, 3], vec![0, 2, 2], 5));
+        assert_eq!(Blocks::new("numbers", &[i32::MAX as usize, 0]).total, i32::MAX as usize);
+    }
+
+    #[test]
+    #[should_panic(expected = "numbers: 2147483648 numbers in one message")]
+    fn more_than_mpi_can_count_is_refused() {
+        Blocks::new("numbers", &[1 << 30, 1 << 30]);
     }
 }

@@ -39,12 +39,21 @@ enum Task {
     Compare,
 }
 
-/// Numbers that arrays consist of: any bytes of their size are one.
-pub trait Number: H5Type {}
+/// Numbers that arrays consist of. The trait is sealed: reading relies on any bytes of their size being one.
+pub trait Number: H5Type + sealed::AnyBytes {}
 
 impl Number for f64 {}
 impl Number for i64 {}
 impl Number for u8 {}
+
+mod sealed {
+    /// Types of which any bytes are a value.
+    pub trait AnyBytes {}
+
+    impl AnyBytes for f64 {}
+    impl AnyBytes for i64 {}
+    impl AnyBytes for u8 {}
+}
 
 impl<'a> SharedFile<'a> {
     /// Creates or truncates a file: through MPI-IO if the ranks are MPI processes, else by the only rank.
@@ -178,7 +187,7 @@ impl<'a> SharedFile<'a> {
         let mut bytes = vec![0; length * size_of::<T>()];
         agree(self.comm, name, self.fetch(&dataset, begin, count, &mut bytes))?;
         let numbers = bytes.chunks_exact(size_of::<T>());
-        // Safety: any bytes of its size are a number.
+        // Safety: any bytes of its size are a number (`sealed::AnyBytes`).
         Ok(numbers.map(|number| unsafe { number.as_ptr().cast::<T>().read_unaligned() }).collect())
     }
 

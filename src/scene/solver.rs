@@ -24,7 +24,8 @@ pub struct Solver {
     pub qp: Qp,
     /// Preconditioner of the dual problem.
     pub preconditioner: Preconditioner,
-    /// How the active set grows inside SMALSE-M.
+    /// How the active set grows inside SMALSE-M. Only where `qp` is SMALSE-M: active sets that fall back on it take projected
+    /// conjugate gradient steps.
     pub expansion: Expansion,
     /// What factors are stored in.
     pub precision: Precision,
