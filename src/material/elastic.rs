@@ -13,16 +13,19 @@ pub struct Hooke {
 
 impl Hooke {
     /// Lame's second constant mu = E / (2 (1 + nu)), the shear modulus.
+    #[inline]
     pub fn shear_modulus(&self) -> f64 {
         self.young / (2.0 * (1.0 + self.poisson))
     }
 
     /// Lame's first constant lambda = E nu / ((1 + nu) (1 - 2 nu)).
+    #[inline]
     pub fn lambda(&self) -> f64 {
         self.young * self.poisson / ((1.0 + self.poisson) * (1.0 - 2.0 * self.poisson))
     }
 
     /// Bulk modulus E / (3 (1 - 2 nu)).
+    #[inline]
     pub fn bulk_modulus(&self) -> f64 {
         self.young / (3.0 * (1.0 - 2.0 * self.poisson))
     }
@@ -48,6 +51,7 @@ impl Hooke {
     }
 
     /// stress : C^-1 : stress (energy per volume).
+    #[inline]
     pub fn complementary_square(&self, stress: &Voigt) -> f64 {
         let (shear, mean) = (stress_norm(&deviator(stress)), trace(stress) / 3.0);
         shear * shear / (2.0 * self.shear_modulus()) + mean * mean / self.bulk_modulus()
