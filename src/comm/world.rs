@@ -78,11 +78,15 @@ impl Blocks {
             "{what}: {total} numbers in one message, and MPI counts to {}; take fewer subdomains or a coarser mesh",
             i32::MAX
         );
-        let mut end = 0;
-        let mut begin = |&length: &i32| std::mem::replace(&mut end, end + length);
         // None is longer than all together.
         let lengths: Vec<i32> = lengths.iter().map(|&length| length as i32).collect();
-        Self { begins: lengths.iter().map(&mut begin).collect(), lengths, total }
+        let mut begins = Vec::with_capacity(lengths.len());
+        let mut end = 0;
+        for &length in &lengths {
+            begins.push(end);
+            end += length;
+        }
+        Self { lengths, begins, total }
     }
 }
 
