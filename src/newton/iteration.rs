@@ -50,8 +50,8 @@ pub enum Begin {
 pub struct Start {
     /// Torn displacement.
     pub u: Torn,
-    /// Rows that hold there: all equalities and the closed contacts.
-    pub held: Vec<bool>,
+    /// Rows that are kept there: all equalities and the closed contacts.
+    pub kept: Vec<bool>,
 }
 
 /// A displacement with its multipliers, and what is known of both.
@@ -121,18 +121,18 @@ impl<'a> Newton<'a> {
         let rest = |problem: &TornProblem| (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
         let (mut attempt, mut forcing) = (Attempt::FIRST, Forcing::default());
         let (mut reached, mut steps, mut before, mut stood) = (None, Vec::new(), 0, None);
-        let ((u, lambda), held) = match begin {
+        let ((u, lambda), kept) = match begin {
             Begin::Rest => (rest(&problem), None),
-            Begin::Near(start) => ((start.u, rest(&problem).1), Some(start.held)),
+            Begin::Near(start) => ((start.u, rest(&problem).1), Some(start.kept)),
             Begin::At(snapshot) => {
                 (attempt, forcing, reached) = (snapshot.attempt, snapshot.forcing, snapshot.reached);
                 (steps, before, stood) = (snapshot.steps, snapshot.before, Some(snapshot.solver));
                 problem.committed = snapshot.committed;
-                ((snapshot.u, snapshot.lambda), snapshot.held)
+                ((snapshot.u, snapshot.lambda), snapshot.kept)
             }
         };
         Conditions { loads: problem.loads, rhs: problem.rhs } = path.conditions(attempt);
-        let (iterate, outcome) = first_iterate(&problem, &mut solver, (u, lambda), held, stood, timer);
+        let (iterate, outcome) = first_iterate(&problem, &mut solver, (u, lambda), kept, stood, timer);
         let admissible = before < steps.len() || problem.is_admissible(&iterate.u);
         Self { problem, solver, settings, path, attempt, iterate, admissible, forcing, outcome, reached, steps, before }
     }
@@ -147,7 +147,7 @@ impl<'a> Newton<'a> {
             before: self.before,
             u: self.iterate.u.clone(),
             lambda: self.iterate.lambda.clone(),
-            held: None,
+            kept: None,
             forcing: self.forcing,
             solver: self.solver.state(),
         }
@@ -344,11 +344,11 @@ impl<'a> Newton<'a> {
         let Self { problem, solver, path, .. } = self;
         Conditions { loads: problem.loads, rhs: problem.rhs } = path.conditions(attempt);
         let lambda = vec![0.0; problem.gather.rows()];
-        let (u, held) = match &self.reached {
+        let (u, kept) = match &self.reached {
             Some(reached) => (reached.u.clone(), Some(problem.constraints.laws().kept(&reached.lambda, 0.0))),
             None => (problem.gather.zeros(), None),
         };
-        let (iterate, outcome) = first_iterate(problem, solver, (u, lambda), held, None, timer);
+        let (iterate, outcome) = first_iterate(problem, solver, (u, lambda), kept, None, timer);
         self.admissible = problem.is_admissible(&iterate.u);
         (self.attempt, self.iterate, self.outcome) = (attempt, iterate, outcome);
         (self.forcing, self.before) = (Forcing::default(), self.steps.len());
@@ -367,7 +367,7 @@ fn first_iterate(
     problem: &TornProblem,
     solver: &mut StepSolver,
     (u, mut lambda): (Torn, Vec<f64>),
-    held: Option<Vec<bool>>,
+    kept: Option<Vec<bool>>,
     stood: Option<SolverState>,
     timer: &Timer,
 ) -> (Iterate, Option<Outcome>) {
@@ -379,8 +379,8 @@ fn first_iterate(
             None
         }
     };
-    if let Some(held) = held {
-        lambda = solver.expect(problem, &state, held);
+    if let Some(kept) = kept {
+        lambda = solver.expect(problem, &state, kept);
     }
     let residuals = problem.residuals(&u, &state, &lambda);
     let iterate = Iterate { u, lambda, state, residuals, errors: None, ended_by_accuracy: false };

@@ -24,9 +24,9 @@ pub struct Snapshot {
     pub u: Torn,
     /// Its multipliers, of this rank's rows.
     pub lambda: Vec<f64>,
-    /// The rows that hold at the iterate. It is told where bodies have been cut otherwise: multipliers and factors belonged to
-    /// subdomains that are gone, and are made anew from `u` and these rows.
-    pub held: Option<Vec<bool>>,
+    /// The rows that are kept at the iterate; `None` in a snapshot of the same subdomains. Where bodies have been cut otherwise,
+    /// the multipliers and factors of the old subdomains are useless: both are made anew from `u` and these rows.
+    pub kept: Option<Vec<bool>>,
     /// How exactly the next quadratic program is solved.
     pub forcing: Forcing,
     /// What the solver of the steps keeps.

@@ -32,8 +32,8 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
     );
     let (from, to) = ((&coarse.bodies[..], &coarse.pairs[..]), (&fine.bodies[..], &fine.pairs[..]));
     let closed = closed_contacts(comm, from, &solved.closed, to);
-    let held = |kind| if let Kind::Contact { pair } = kind { closed[pair] } else { true };
-    newton::Start { u, held: fine.constraints.rows.iter().map(|row| held(row.kind)).collect() }
+    let kept = |kind| if let Kind::Contact { pair } = kind { closed[pair] } else { true };
+    newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect() }
 }
 
 /// Which boxes of a finer mesh are likely to yield, from where a solved scene does; see [`discretise_expecting`]. `None` if

@@ -144,9 +144,9 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
         }
         Begin::After(Earlier { committed, u }) => {
             let closed = ROUNDING * committed.sizes.displacement;
-            let held = problem.constraints.laws().kept_at(&problem.slack(&u), closed);
+            let kept = problem.constraints.laws().kept_at(&problem.slack(&u), closed);
             problem.committed = committed;
-            newton::Begin::Near(newton::Start { u, held })
+            newton::Begin::Near(newton::Start { u, kept })
         }
         Begin::At(standing) => {
             let Standing { newton, rows, recorded } = *standing;

@@ -197,10 +197,10 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
     };
 
     let kept = numbers.has_kept.then_some(arrays.kept);
-    let (kept, held) = if is_recut { (None, kept) } else { (kept, None) };
+    let (of_programs, kept) = if is_recut { (None, kept) } else { (kept, None) };
     // The operator of other subdomains has another norm.
     let norm = numbers.norm.filter(|_| !is_recut);
-    let programs = ProgramState { kept, reference: numbers.reference, first: numbers.first, norm };
+    let programs = ProgramState { kept: of_programs, reference: numbers.reference, first: numbers.first, norm };
     let precision = if numbers.is_double { Precision::Double } else { Precision::Single };
     let reached = numbers.has_reached.then_some(Reached { u: arrays.reached_u, lambda: arrays.reached_lambda });
     let newton = Snapshot {
@@ -211,7 +211,7 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
         before: numbers.before,
         u: arrays.u,
         lambda: arrays.lambda,
-        held,
+        kept,
         forcing: numbers.forcing,
         solver: SolverState { programs, flows: arrays.flows, precision, bases: arrays.bases },
     };

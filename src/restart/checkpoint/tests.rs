@@ -37,10 +37,10 @@ type Contacts = BTreeMap<[i64; 3], (bool, f64)>;
 
 fn contacts(discrete: &Discrete, standing: &Standing) -> Contacts {
     let newton = &standing.newton;
-    let Some(held) = newton.held.as_ref().or(newton.solver.programs.kept.as_ref()) else { return Contacts::new() };
+    let Some(kept) = newton.kept.as_ref().or(newton.solver.programs.kept.as_ref()) else { return Contacts::new() };
     let force = |row: usize| newton.reached.as_ref().map_or(0.0, |reached| reached.lambda[row]);
     let rows = discrete.constraints.rows.iter().enumerate();
-    rows.filter_map(|(k, row)| Some((contact(discrete, k)?, (held[k], row.scale * force(k))))).collect()
+    rows.filter_map(|(k, row)| Some((contact(discrete, k)?, (kept[k], row.scale * force(k))))).collect()
 }
 
 /// The end of a solution, or its contacts where it was stopped, before step `stop`, and left a checkpoint.
