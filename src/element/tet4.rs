@@ -60,7 +60,7 @@ pub fn shape(corners: &[[f64; 3]; 4]) -> f64 {
     for a in 0..4 {
         for b in 0..a {
             let edge: [f64; 3] = std::array::from_fn(|i| corners[a][i] - corners[b][i]);
-            longest = longest.max(dot(&edge, &edge));
+            longest = longest.max(dot(edge, edge));
         }
     }
     std::f64::consts::SQRT_2 * edges(corners).0 / (longest * longest.sqrt())

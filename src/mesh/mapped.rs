@@ -243,7 +243,7 @@ mod tests {
                     let mut nodes = mesh.surface(name).iter().flatten();
                     assert!(!mesh.surface(name).is_empty() && nodes.all(|&n| holds(mesh.points[n as usize])), "{name}");
                 };
-                let radius = |[x, y, z]: [f64; 3]| length(&[x, y, if is_sphere { z } else { 0.0 }]);
+                let radius = |[x, y, z]: [f64; 3]| length([x, y, if is_sphere { z } else { 0.0 }]);
                 on("inner", &|x| (radius(x) - 100.0).abs() < 1e-12);
                 on("outer", &|x| (radius(x) - 200.0).abs() < 1e-12);
                 on("x0", &|x| x[0] == 0.0);
