@@ -2,7 +2,8 @@
 
 use faer::Mat;
 
-use crate::assembly::stiffness;
+use crate::assembly::flow::Flow;
+use crate::assembly::{Region, stiffness};
 use crate::comm::{Comm, threads};
 use crate::constraint::Row;
 use crate::decomposition::Subdomain;
@@ -11,13 +12,16 @@ use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::dual::gather::Gather;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::dual::space::RowSpace;
+use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::{Factors, analyse};
 use crate::feti::inverse::hybrid::Hybrid;
 use crate::feti::inverse::kernel;
 use crate::feti::inverse::kernel::RigidModes;
+use crate::feti::inverse::tangents::Iterate;
 use crate::material::Material;
 use crate::model;
 use crate::model::discrete::Discrete;
+use crate::monitor::timing::Timer;
 use crate::random::Random;
 use crate::scene::Scene;
 use crate::sparse::cholesky::Precision;
@@ -205,8 +209,16 @@ impl<'a> Setup<'a> {
         let clusters = &self.discrete.decomposition.clusters;
         let hybrid =
             (!clusters.are_single()).then(|| Hybrid::new(clusters.of_rank(self.comm.rank()), self.subdomains()));
-        let mut operator = DualOperator::new(self.factors().0, hybrid, &self.gather);
-        operator.update_clusters().expect("bodies are whole");
+        let (count, timer) = (self.subdomains().len(), Timer::start());
+        let symbolic = analyse(self.subdomains());
+        let inverse = Inverse::new(symbolic, Precision::Double, hybrid, vec![None; count], vec![Vec::new(); count]);
+        let mut operator = DualOperator::new(inverse, &self.gather);
+        let region =
+            |subdomain| Region { subdomain, material: &self.discrete.materials[subdomain.material], history: &[] };
+        let regions: Vec<Region> = self.subdomains().iter().map(region).collect();
+        let (u, yielding, flows) = (&self.gather.zeros(), &vec![0; count][..], &vec![Flow::default(); count][..]);
+        let iterate = Iterate { regions: &regions, u, yielding, flows };
+        operator.update(&iterate, 0.0, None, &self.space, &timer).expect("elastic bodies are stiff");
         operator
     }
 

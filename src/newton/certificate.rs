@@ -81,11 +81,11 @@ impl StepSolver<'_> {
         timer: &Timer,
     ) -> Certificate {
         let (mut lambda, balanced) = timer.time("coarse problem", || self.balance(problem, lambda));
-        if self.operator.is_hybrid() {
+        if self.operator.inverse().is_hybrid() {
             let mut torn = problem.unbalance(state);
             problem.gather.add_transpose(-1.0, &lambda, &mut torn);
-            timer.time("certificate", || self.operator.invert(&mut torn));
-            self.add_bonds(problem, [&mut lambda]);
+            timer.time("certificate", || self.operator.inverse_mut().solve(&mut torn));
+            self.operator.add_bonds(problem.constraints, [&mut lambda]);
         }
         let pull: Vec<f64> = lambda
             .iter()
@@ -101,7 +101,7 @@ impl StepSolver<'_> {
         let mut estimate = f64::INFINITY;
         for solves in 1..=TURNS {
             let mut correction = rho.clone();
-            timer.time("certificate", || self.operator.factors.solve(&mut correction));
+            timer.time("certificate", || self.operator.inverse_mut().solve_each(&mut correction));
             let mut partial = Vec::with_capacity(4 * u.len());
             timer.time("certificate", || {
                 for (own, subdomain) in problem.subdomains.iter().enumerate() {
@@ -148,7 +148,7 @@ impl StepSolver<'_> {
     /// The nearest multipliers, or nearly so, that balance the loads on every subdomain and do not pull; and whether they do,
     /// up to rounding.
     fn balance(&self, problem: &TornProblem, lambda: &[f64]) -> (Vec<f64>, bool) {
-        let coarse = &self.projector.coarse;
+        let coarse = self.projector.coarse();
         let wanted = recover::resultants(problem.subdomains, problem.modes, coarse, &problem.loads);
         let is_contact = |row: usize| problem.constraints.rows[row].is_inequality();
         let largest = |mine: f64| problem.space.maximum(mine);

@@ -129,11 +129,11 @@ impl Programs {
             return Warm { balance, lambda };
         };
         let mut lambda = last.clone();
-        let missing: Vec<f64> = balance.iter().zip(projector.coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
+        let missing: Vec<f64> = balance.iter().zip(projector.coarse().apply(&lambda)).map(|(e, b)| e - b).collect();
         let size = balance.iter().map(|e| e * e).sum::<f64>().sqrt();
         if face.unbalanced(&missing, size).is_none() {
             // Open contacts stay open.
-            face.add_balance(&projector.coarse, missing, &mut lambda);
+            face.add_balance(projector.coarse(), missing, &mut lambda);
         } else {
             let mut change = vec![0.0; rows];
             projector.particular(&missing, &mut change);
@@ -210,7 +210,7 @@ impl Programs {
         let space = Multipliers(problem.space, dual.timer);
         let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
         let at_floor = self.note(&limits, report.first_norm);
-        let face = self.take_face(&dual.projector.coarse, lambda.len())?;
+        let face = self.take_face(dual.projector.coarse(), lambda.len())?;
         self.last = Some((lambda.clone(), face));
         let (outcome, statistics) = (report.outcome, report.statistics);
         Ok(Found { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
@@ -226,7 +226,7 @@ impl Programs {
     ) -> Result<Found, Floating> {
         let space = Multipliers(problem.space, dual.timer);
         let bounded: Vec<bool> = problem.constraints.rows.iter().map(|row| row.is_inequality()).collect();
-        let rows = self.take_face(&dual.projector.coarse, bounded.len())?;
+        let rows = self.take_face(dual.projector.coarse(), bounded.len())?;
         let mut kept = rows.kept().to_vec();
         let mut face =
             DualFace { dual: dual.reborrow(), constraints: problem.constraints, balance: &warm.balance, rows };
@@ -267,10 +267,10 @@ impl Programs {
             }
             // Open contacts are part of b, but not of the rigid motion: the last step's set tells them apart.
             let multiplier = self.last.as_ref().map(|(_, face)| {
-                let mut a = face.amplitudes(&projector.coarse, &b);
+                let mut a = face.amplitudes(projector.coarse(), &b);
                 a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
                 let mut multiplier = vec![0.0; b.len()];
-                projector.coarse.add_transpose(1.0, &a, &mut multiplier);
+                projector.coarse().add_transpose(1.0, &a, &mut multiplier);
                 multiplier
             });
             let contacts = problem.constraints.rows.iter().zip(&start);
@@ -294,7 +294,7 @@ impl Programs {
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         let held = problem.constraints.rows.iter().zip(&lambda).map(|(row, &l)| !row.is_inequality() || l > 0.0);
-        let face = timer.time("coarse set-up", || CoarseFace::new(&projector.coarse, held.collect()))?;
+        let face = timer.time("coarse set-up", || CoarseFace::new(projector.coarse(), held.collect()))?;
         self.last = Some((lambda.clone(), face));
         Ok(Found { lambda, balanced, outcome, statistics, at_floor })
     }

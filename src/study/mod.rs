@@ -26,13 +26,13 @@ use crate::feti::dual::coupling::Coupling;
 use crate::feti::dual::gather::Gather;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::dual::space::RowSpace;
-use crate::feti::dual::supported;
-use crate::feti::inverse::factor::{Factors, analyse};
+use crate::feti::inverse::Inverse;
+use crate::feti::inverse::factor::analyse;
 use crate::feti::inverse::hybrid::Hybrid;
 use crate::feti::inverse::kernel;
+use crate::feti::inverse::pinnable;
 use crate::feti::inverse::schur::Schur;
 use crate::feti::preconditioner::Preconditioner;
-use crate::feti::preconditioner::deluxe::Deluxe;
 use crate::material::History;
 use crate::model::{self, Discrete, ModelError, bodies};
 use crate::monitor::events::Event;
@@ -171,10 +171,7 @@ pub fn solve_from(
         scene::Preconditioner::Lumped => Some(schur(None)),
         scene::Preconditioner::Dirichlet => Some(schur(Some(precision))),
     };
-    let preconditioner = schur.map(|schur| {
-        let deluxe = Deluxe::new(comm, shares, constraints, &gather, &schur);
-        Preconditioner::new(&gather, schur, deluxe)
-    });
+    let preconditioner = schur.map(|schur| Preconditioner::new(comm, shares, constraints, &gather, schur));
     let (loading::Conditions { loads, rhs }, stages) = model::conditions::stages(scene, discrete, &|| gather.zeros());
     let mut problem = TornProblem {
         subdomains,
@@ -212,10 +209,10 @@ pub fn solve_from(
     let clusters = &decomposition.clusters;
     let hybrid = (!clusters.are_single())
         .then(|| timer.time("clusters", || Hybrid::new(clusters.of_rank(comm.rank()), subdomains)));
-    let operator = DualOperator::new(Factors::new(symbolic, precision), hybrid, &gather);
-    let supported = supported::unknowns(constraints, &gather, subdomains, &modes);
-    let projector = Projector { coarse };
-    let mut steps = StepSolver::new(operator, projector, preconditioner, programs, twins(comm, subdomains), supported);
+    let pinnable = pinnable::unknowns(constraints, subdomains, &modes);
+    let inverse = Inverse::new(symbolic, precision, hybrid, twins(comm, subdomains), pinnable);
+    let operator = DualOperator::new(inverse, &gather);
+    let mut steps = StepSolver::new(operator, Projector::new(coarse), preconditioner, programs);
     let report = RefCell::new(report);
     let alive = |step, applications| {
         report.borrow_mut()(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });
