@@ -27,6 +27,7 @@ pub mod restart;
 pub mod results;
 pub mod scene;
 pub mod sizing;
+pub mod span;
 pub mod sparse;
 pub mod study;
 pub mod tensor;
