@@ -100,7 +100,7 @@ pub struct Factors {
 }
 
 impl Factors {
-    /// Space for the factors; nothing is factorised yet. Of single precision are those that pass a probe.
+    /// Space for the factors; nothing is factorised yet. With single `precision`, a factor that fails a probe is made again in double.
     pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
         let factors = Stock::new(symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)));
@@ -213,7 +213,7 @@ impl Factors {
         self.stamps[own] = self.stamps[twin];
     }
 
-    /// A number that is the same as before, or as that of another, as long as the factor is.
+    /// A number of the factor of an own subdomain. Equal numbers mean equal factors, of one subdomain over time or of two.
     pub fn stamp(&self, own: usize) -> u64 {
         self.stamps[own]
     }

@@ -1,4 +1,4 @@
-//! The tangents of own subdomains: which factors they need, and which of these are kept, shared or made again.
+//! The tangents of own subdomains: which of their factors are kept, shared or made again.
 
 use std::rc::Rc;
 use std::sync::Arc;
