@@ -4,19 +4,23 @@ use std::ops::Deref;
 
 use faer::Mat;
 
+use crate::assembly::flow::Flow;
 use crate::assembly::{Region, stiffness};
 use crate::comm::{Comm, threads};
 use crate::constraint::Row;
 use crate::decomposition::Subdomain;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::dual::operator::DualOperator;
+use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::{Factors, analyse};
 use crate::feti::inverse::hybrid::Hybrid;
+use crate::feti::inverse::tangents::Iterate;
 use crate::feti::{Interconnection, Torn};
 use crate::material::Material;
 use crate::model;
 use crate::model::discrete::Discrete;
 use crate::monitor::events::Event;
+use crate::monitor::timing::Timer;
 use crate::random::Random;
 use crate::restart::Standing;
 use crate::scene::Scene;
@@ -207,8 +211,16 @@ impl<'a> Setup<'a> {
         let clusters = &self.discrete.decomposition.clusters;
         let hybrid =
             (!clusters.are_single()).then(|| Hybrid::new(clusters.of_rank(self.comm.rank()), self.subdomains()));
-        let mut operator = DualOperator::new(self.factors().0, hybrid, &self.gather);
-        operator.update_clusters().expect("bodies are whole");
+        let (count, timer) = (self.subdomains().len(), Timer::start());
+        let symbolic = analyse(self.subdomains());
+        let inverse = Inverse::new(symbolic, Precision::Double, hybrid, vec![None; count], vec![Vec::new(); count]);
+        let mut operator = DualOperator::new(inverse, &self.gather);
+        let region =
+            |subdomain| Region { subdomain, material: &self.discrete.materials[subdomain.material], history: &[] };
+        let regions: Vec<Region> = self.subdomains().iter().map(region).collect();
+        let (u, yielding, flows) = (&self.gather.zeros(), &vec![0; count][..], &vec![Flow::default(); count][..]);
+        let iterate = Iterate { regions: &regions, u, yielding, flows };
+        operator.update(&iterate, 0.0, None, &self.space, &timer).expect("elastic bodies are stiff");
         operator
     }
 

@@ -25,7 +25,7 @@ pub fn exhausted(bytes: usize) -> ! {
     let mut stderr = ManuallyDrop::new(unsafe { File::from_raw_fd(2) });
     let mut text = [0; 512];
     let mut left = &mut text[..];
-    // What does not fit, or nobody listens to, is lost.
+    // A message that does not fit, or that nobody reads, is lost.
     let _ = writeln!(
         left,
         "fetiplast: out of memory: {} MiB more were asked for, and the system has no more; take more machines or a coarser \
@@ -37,6 +37,7 @@ pub fn exhausted(bytes: usize) -> ! {
     low_level::exit(EXIT_MEMORY)
 }
 
+/// The pointer, unless it is null: then there is no memory, and the process ends.
 fn there(pointer: *mut u8, bytes: usize) -> *mut u8 {
     if pointer.is_null() {
         exhausted(bytes);
@@ -44,7 +45,7 @@ fn there(pointer: *mut u8, bytes: usize) -> *mut u8 {
     pointer
 }
 
-// Safety: all is left to the system's allocator; what it could not do never returns.
+// Safety: all calls go to the system's allocator. A null pointer is never returned: the process ends.
 unsafe impl GlobalAlloc for Heap {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         there(unsafe { System.alloc(layout) }, layout.size())

@@ -87,6 +87,7 @@ mod newton;
 
 mod restart;
 mod sizing;
+mod span;
 mod sparse;
 mod tensor;
 mod vector;

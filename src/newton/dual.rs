@@ -51,7 +51,7 @@ impl<'a> Dual<'_, 'a> {
     /// From now on the preconditioner scales the kept rows only.
     pub fn restrict_scaling(&mut self, constraints: &Constraints, kept: &[bool]) {
         if let Some(preconditioner) = &mut self.preconditioner {
-            self.timer.time("scaling", || preconditioner.scaling.restrict(constraints, |row| kept[row]));
+            self.timer.time("scaling", || preconditioner.restrict(constraints, |row| kept[row]));
         }
     }
 
@@ -68,7 +68,7 @@ impl<'a> Dual<'_, 'a> {
 impl Operator for Dual<'_, '_> {
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.timer.time("dual operator", || self.operator.apply(x, y));
-        self.timer.count("dual operator", 0.0, self.operator.factors.bytes_per_solve());
+        self.timer.count("dual operator", 0.0, self.operator.bytes_per_apply());
         (self.alive)(self.operator.applications());
     }
 }
@@ -94,7 +94,7 @@ impl Quadratic for Dual<'_, '_> {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         let Some(preconditioner) = &mut self.preconditioner else { return false };
         self.timer.time("preconditioner", || preconditioner.apply(r, z));
-        self.timer.count("preconditioner", 0.0, preconditioner.schur.bytes_per_apply());
+        self.timer.count("preconditioner", 0.0, preconditioner.bytes_per_apply());
         true
     }
 }
@@ -116,7 +116,7 @@ const RESISTS: f64 = 1e-9;
 
 impl DualFace<'_, '_> {
     fn coarse(&self) -> &Coarse<'_> {
-        &self.dual.projector.coarse
+        self.dual.projector.coarse()
     }
 
     /// Adds contacts until the rows of the set can balance `e`: while a free motion is left that `e` drives, those that resist

@@ -14,11 +14,12 @@ pub struct Errors {
     pub gap: f64,
     /// Distance from the solution on this mesh at most, see [`super::certificate`].
     pub algebraic: f64,
-    /// Whether that is a bound; else an estimate.
+    /// Whether `algebraic` is a bound; else it is an estimate.
     pub is_bound: bool,
     /// Distance of the solution on this mesh from the exact one, estimated, see [`crate::estimate`].
     pub discretisation: f64,
-    /// Share of each element of each own subdomain in that: the squares of all add up to its square.
+    /// Part of each element of each own subdomain: the squares of all parts, over all ranks, add up to the square of
+    /// `discretisation`.
     pub elements: Vec<Vec<f64>>,
 }
 
@@ -56,7 +57,7 @@ impl StepSolver<'_> {
     }
 }
 
-/// `a / b`, and zero where there is nothing.
+/// `a / b`; zero if `a` is, whatever `b`.
 fn relative(a: f64, b: f64) -> f64 {
     if a == 0.0 { 0.0 } else { a / b }
 }

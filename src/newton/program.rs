@@ -131,11 +131,11 @@ impl Programs {
             return Warm { resultants, lambda };
         };
         let mut lambda = last.to_vec();
-        let missing: Vec<f64> = resultants.iter().zip(projector.coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
+        let missing: Vec<f64> = resultants.iter().zip(projector.coarse().apply(&lambda)).map(|(e, b)| e - b).collect();
         let size = resultants.iter().map(|e| e * e).sum::<f64>().sqrt();
         if face.unbalanced(&missing, size).is_none() {
             // Open contacts stay open.
-            face.add_balance(&projector.coarse, missing, &mut lambda);
+            face.add_balance(projector.coarse(), missing, &mut lambda);
         } else {
             let mut change = vec![0.0; rows];
             projector.particular(&missing, &mut change);
@@ -204,7 +204,7 @@ impl Programs {
         let space = Multipliers(problem.space, dual.timer);
         let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
         let at_floor = self.note(&limits, report.first_norm);
-        self.face = Some(self.take_face(&dual.projector.coarse, lambda.len())?);
+        self.face = Some(self.take_face(dual.projector.coarse(), lambda.len())?);
         let (outcome, statistics) = (report.outcome, report.statistics);
         Ok(Found { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
     }
@@ -219,7 +219,7 @@ impl Programs {
     ) -> Result<Found, Floating> {
         let space = Multipliers(problem.space, dual.timer);
         let bounded = problem.constraints.laws().may_open();
-        let rows = self.take_face(&dual.projector.coarse, bounded.len())?;
+        let rows = self.take_face(dual.projector.coarse(), bounded.len())?;
         let mut kept = rows.kept().to_vec();
         let mut face =
             DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants: &warm.resultants, rows };
@@ -261,10 +261,10 @@ impl Programs {
             // The multiplier of G x = 0 follows from b on the rows that the last program kept. The slack of open contacts
             // is part of b too, but is no rigid motion.
             let multiplier = self.face.as_ref().map(|face| {
-                let mut a = face.amplitudes(&projector.coarse, &b);
+                let mut a = face.amplitudes(projector.coarse(), &b);
                 a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
                 let mut multiplier = vec![0.0; b.len()];
-                projector.coarse.add_transpose(1.0, &a, &mut multiplier);
+                projector.coarse().add_transpose(1.0, &a, &mut multiplier);
                 multiplier
             });
             let lower = problem.constraints.laws().lower_bounds(&start);
@@ -287,7 +287,7 @@ impl Programs {
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         let kept = problem.constraints.laws().kept(&lambda, 0.0);
-        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(&projector.coarse, kept))?);
+        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(projector.coarse(), kept))?);
         Ok(Found { lambda, balanced, outcome, statistics, at_floor })
     }
 

@@ -1,27 +1,28 @@
-//! One Newton step: tangents, factors, the dual quadratic program, and back to a displacement.
+//! One Newton step: the minimiser `du` of the quadratic model `J_k` over the admissible steps (paper, (9) and (10)).
+//!
+//! ```text
+//! f_k = f - F(u_k),   c_k = c - B u_k,   K_k = K(u_k)
+//! min 1/2 l'F l - l'd  over  l_I >= 0,  G l = e,   with  F = B K_k^+ B',  d = B K_k^+ f_k - c_k,  e = R'f_k      (14)
+//! du = K_k^+ (f_k - B'l) + R alpha
+//! ```
+//!
+//! The operators are those of [`crate::feti`], the program is solved by [`super::program`].
 
-use crate::vector::dot;
 use std::sync::Arc;
 
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
 use super::problem::{State, TornProblem};
-use super::program::{Found, ProgramSettings, ProgramState, Programs};
+use super::program::{Found, ProgramSettings, ProgramState, Programs, Warm};
 use crate::assembly::flow::{self, Flow};
-use crate::constraint::Kind;
-use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::coarse::motion;
 use crate::feti::coarse::projector::Projector;
 use crate::feti::coarse::recover;
-use crate::feti::dual::held::Held;
-use crate::feti::dual::operator::DualOperator;
+use crate::feti::dual::operator::{DualOperator, Singular};
 use crate::feti::inverse::basis::Bases;
-use crate::feti::inverse::factor::NotDefinite;
-use crate::feti::inverse::refine::refine;
-use crate::feti::inverse::tangents::{Factorising, Tangents};
+use crate::feti::inverse::tangents::Iterate;
 use crate::feti::preconditioner::Preconditioner;
-use crate::feti::preconditioner::scaling::Scaling;
 use crate::monitor::timing::Timer;
 use crate::qp::{Outcome, Statistics};
 use crate::sparse::cholesky::Precision;
@@ -49,7 +50,7 @@ pub struct Step {
     pub factorisations: usize,
 }
 
-/// What later steps depend on, but for the multipliers.
+/// What later steps depend on, beside the multipliers.
 #[derive(Clone, Debug)]
 pub struct SolverState {
     /// Of the quadratic programs.
@@ -58,11 +59,11 @@ pub struct SolverState {
     pub flows: Vec<Flow>,
     /// What new factors are stored in at least.
     pub precision: Precision,
-    /// What the factors of each own subdomain are of.
+    /// The states whose tangents the factors of each own subdomain are of.
     pub bases: Vec<Bases>,
 }
 
-/// What is kept from step to step: factors, projector, the rows that the last program kept.
+/// What is kept from step to step: `F`, `P`, the preconditioner, the last program.
 pub struct StepSolver<'a> {
     pub(super) operator: DualOperator<'a>,
     pub(super) projector: Projector<'a>,
@@ -70,32 +71,25 @@ pub struct StepSolver<'a> {
     pub(super) programs: Programs,
     /// Directions of flow in each own subdomain.
     flows: Vec<Flow>,
-    tangents: Tangents,
-    /// For each own subdomain, unknowns that supports may keep at zero ([`crate::feti::dual::supported`]).
-    supported: Vec<Vec<u32>>,
 }
 
 impl<'a> StepSolver<'a> {
-    /// On factors and a projector set up for the problem's subdomains; `twins` numbers those that have congruent ones, `supported`
-    /// tells what their supports may keep at zero ([`crate::feti::dual::supported`]).
+    /// On operators that are set up for the problem's subdomains; nothing is factorised before the first step.
     pub fn new(
         operator: DualOperator<'a>,
         projector: Projector<'a>,
         preconditioner: Option<Preconditioner<'a>>,
         settings: ProgramSettings,
-        twins: Vec<Option<usize>>,
-        supported: Vec<Vec<u32>>,
     ) -> Self {
-        let flows = vec![Flow::default(); twins.len()];
-        let (programs, tangents) = (Programs::new(settings), Tangents::new(twins));
-        Self { operator, projector, preconditioner, programs, flows, tangents, supported }
+        let flows = vec![Flow::default(); operator.inverse().bases().len()];
+        Self { operator, projector, preconditioner, programs: Programs::new(settings), flows }
     }
 
     /// What the next steps depend on.
     pub fn state(&self) -> SolverState {
-        let precision = self.operator.factors.precision();
-        let (flows, bases) = (self.flows.clone(), self.tangents.bases().to_vec());
-        SolverState { programs: self.programs.state(), flows, precision, bases }
+        let inverse = self.operator.inverse();
+        let (precision, bases) = (inverse.precision(), inverse.bases().to_vec());
+        SolverState { programs: self.programs.state(), flows: self.flows.clone(), precision, bases }
     }
 
     /// Goes on from such a state: makes the factors again, to the same bits. Collective.
@@ -105,55 +99,51 @@ impl<'a> StepSolver<'a> {
     pub fn resume(&mut self, problem: &TornProblem, state: SolverState, timer: &Timer) -> Result<(), String> {
         let SolverState { programs, flows, precision, bases } = state;
         self.flows = flows;
-        self.programs.resume(&self.projector.coarse, programs);
-        self.operator.factors.set_precision(precision);
-        let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
-        let outcome = self.tangents.remake(&problem.regions(), bases, &mut on);
-        agree_on(outcome.err(), problem)
+        self.programs.resume(self.projector.coarse(), programs);
+        let interiors = self.preconditioner.as_mut().map(Preconditioner::interiors);
+        let outcome = self.operator.remake(&problem.regions(), (precision, bases), interiors, problem.space, timer);
+        outcome.map_err(|singular| singular.to_string())
     }
 
-    /// Starts from the multipliers that a displacement and the rows that hold there suggest; returns them. They are
-    /// `(B B')^-1 B (f - F(u))` on these rows. Collective.
-    pub fn expect(&mut self, problem: &TornProblem, state: &State, held: Vec<bool>) -> Vec<f64> {
-        let mut lambda = vec![0.0; held.len()];
+    /// Starts from multipliers that balance a displacement as well as the rows that are `kept` there can:
+    /// `(B B')^-1 B (f - F(u))` on these rows, as far as their laws admit it, and zero on others. Returns them. Collective.
+    pub fn expect(&mut self, problem: &TornProblem, state: &State, kept: Vec<bool>) -> Vec<f64> {
+        let mut lambda = vec![0.0; kept.len()];
         problem.gather.apply(&problem.unbalance(state), &mut lambda);
-        problem.coupling.borrow_mut().solve(&mut lambda, |row| held[row]);
-        problem.constraints.laws().project_onto(&held, &mut lambda);
-        self.programs.expect(&self.projector.coarse, held);
+        problem.coupling.borrow_mut().solve(&mut lambda, |row| kept[row]);
+        problem.constraints.laws().project_onto(&kept, &mut lambda);
+        self.programs.expect(self.projector.coarse(), kept);
         lambda
     }
 
     /// Forgets the multipliers and factors of a solve that failed.
     pub fn forget(&mut self) {
         self.programs.forget();
-        self.tangents.drop_factors();
+        self.operator.inverse_mut().forget();
     }
 
-    /// Another solve follows, from what is committed now: its tolerances refer to its own first residual where that is
-    /// larger than earlier ones.
+    /// Another solve follows, from what is committed now. Its tolerances refer to its first residual if that is larger than
+    /// those of earlier solves.
     pub fn begin(&mut self) {
         self.programs.begin();
         self.flows.fill(Flow::default());
-        self.tangents.commit();
+        self.operator.inverse_mut().begin();
     }
 
     /// From now on factorises in double precision; false if that was so before.
     pub fn sharpen(&mut self) -> bool {
-        let before = self.operator.factors.precision();
-        self.operator.factors.set_precision(Precision::Double);
-        self.tangents.drop_factors();
-        before == Precision::Single
+        self.operator.inverse_mut().sharpen()
     }
 
     /// How far one step of a linear problem may reduce the gradient.
     pub fn linear_drop(&self) -> f64 {
-        match self.operator.factors.precision() {
+        match self.operator.inverse().precision() {
             Precision::Single => TIGHTEST,
             Precision::Double => 0.0,
         }
     }
 
-    /// Takes the directions of flow along in a step of this `length` from `u` to `next`.
+    /// Updates the directions of flow after a step of this `length` from `u` to `next` ([`crate::assembly::flow`]). Local.
     pub fn follow(&mut self, problem: &TornProblem, (u, state): (&Torn, &State), next: &Torn, length: f64) {
         for (own, flow) in self.flows.iter_mut().enumerate() {
             if state.yielding[own] == 0 {
@@ -165,8 +155,7 @@ impl<'a> StepSolver<'a> {
         }
     }
 
-    /// Solves for the step at `u` from the `last` multipliers, those of the step before or of the last attempt at this one;
-    /// `alive` is told the applications of F so far. Collective.
+    /// Solves for the step at `u` from the `last` multipliers, those of the step before or of the last trial of this one; `alive` is told the applications of F so far. Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent or the coarse problem is singular.
@@ -180,23 +169,22 @@ impl<'a> StepSolver<'a> {
         alive: &dyn Fn(usize),
     ) -> Result<Step, String> {
         let before = self.operator.applications();
-        let factorisations = self.update_tangents(problem, (u, state), forcing.left, timer)?;
-        let rows = problem.gather.rows();
 
-        let mut forces = problem.unbalance(state);
+        // K_k, its factors, and the preconditioner.
+        let factorisations =
+            self.update(problem, (u, state), forcing.left, timer).map_err(|singular| singular.to_string())?;
+
+        // f_k and c_k (9), less what pinned supports move.
         let slack = problem.slack(u);
-        let mut open = slack.clone();
-        let lifted = self.held(problem).map(|held| held.lift(&mut forces, &mut open));
-        let coarse = &self.projector.coarse;
-        let warm = timer.time("coarse problem", || {
-            let balance = recover::resultants(problem.subdomains, problem.modes, coarse, &forces);
-            self.programs.start(&self.projector, last, balance)
-        });
-        let mut b = vec![0.0; rows];
-        let mut torn = forces.clone();
-        self.respond(&warm.lambda, &mut torn, &mut b, timer);
-        b.iter_mut().zip(&open).for_each(|(b, s)| *b -= s);
+        let (mut forces, mut open) = (problem.unbalance(state), slack.clone());
+        let pinned = self.operator.pinned(problem.constraints);
+        let lifted = pinned.map(|pinned| pinned.lift(&mut forces, &mut open));
 
+        // lambda (14), from multipliers with G lambda = e and the residual d - F lambda there.
+        let warm = self.start(problem, &forces, last, timer);
+        let mut residual = vec![0.0; slack.len()];
+        self.respond(&warm.lambda, &mut forces.clone(), &mut residual, timer);
+        residual.iter_mut().zip(&open).for_each(|(r, c)| *r -= c);
         let dual = Dual {
             operator: &mut self.operator,
             projector: &self.projector,
@@ -205,182 +193,105 @@ impl<'a> StepSolver<'a> {
             timer,
             alive: &|applications| alive(applications - before),
         };
-        let found = self.programs.solve(problem, dual, warm, b, forcing).map_err(|floating| floating.to_string())?;
-        let Found { mut lambda, mut balanced, outcome, statistics, at_floor } = found;
+        let found = self.programs.solve(problem, dual, warm, residual, forcing);
+        let mut found = found.map_err(|floating| floating.to_string())?;
 
-        let mut defect = vec![0.0; rows];
-        let mut du = forces.clone();
-        self.respond(&balanced, &mut du, &mut defect, timer);
-        self.add_hidden(problem, (&forces, &du), [&mut lambda, &mut balanced]);
-        let mut local = forces.clone();
-        problem.gather.add_transpose(-1.0, &balanced, &mut local);
+        // du = K^+ (f_k - B'lambda) + R alpha.
         let wanted = forcing.drop.max(EXACT);
-        let norm = |x: &Torn| {
-            let squares: Vec<f64> = x.iter().map(|x| dot(x, x)).collect();
-            problem.space.sum(&squares, 1)[0].sqrt()
-        };
-        let (local_residual, refined) = timer.time("refinement", || {
-            refine(&mut self.operator.factors, self.tangents.values(), &norm, (&local, &mut du), wanted)
-        });
-        if refined > 0 {
-            self.operator.rejoin(&mut du);
-            self.add_hidden(problem, (&forces, &du), [&mut lambda, &mut balanced]);
-            problem.gather.apply(&du, &mut defect);
-        }
-        defect.iter_mut().zip(&open).for_each(|(d, s)| *d -= s);
-        if let Some(face) = self.programs.face() {
-            let coarse = &self.projector.coarse;
-            let back = timer.time("coarse problem", || motion::amplitudes(face, coarse, problem.space, &defect));
-            recover::add_rigid_motion(problem.subdomains, problem.modes, coarse, -1.0, &back, &mut du);
-        }
-        for (du, lifted) in du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {
+        let mut recovered = self.recover(problem, (&forces, &open), &mut found, wanted, timer);
+        for (du, lifted) in recovered.du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {
             *du += lifted;
         }
-        self.mend(problem, &slack, &mut du, timer);
+
+        // What the tolerance of the program left open is closed.
+        if let (Some(preconditioner), Some(face)) = (&mut self.preconditioner, self.programs.face()) {
+            preconditioner.close(problem.constraints, &slack, face.kept(), &mut recovered.du, timer);
+        }
+        let Recovered { du, local_residual, refined } = recovered;
+        let Found { lambda, outcome, statistics, at_floor, .. } = found;
         let applications = self.operator.applications() - before + refined;
         Ok(Step { du, lambda, outcome, statistics, at_floor, local_residual, applications, factorisations })
     }
 
-    /// Adds to multipliers, the last of which are in balance, what the quadratic program does not see: what balances each member
-    /// of a cluster, and what supports carry that hold subdomains still.
-    fn add_hidden(&self, problem: &TornProblem, state: (&Torn, &Torn), [lambda, balanced]: [&mut Vec<f64>; 2]) {
-        self.add_bonds(problem, [&mut *lambda, &mut *balanced]);
-        if let Some(held) = self.held(problem) {
-            held.add_reactions(state, [lambda, balanced]);
-        }
-    }
-
-    /// Adds to multipliers what balances each member of a cluster.
-    pub(super) fn add_bonds<const N: usize>(&self, problem: &TornProblem, multipliers: [&mut Vec<f64>; N]) {
-        if let Some(bonds) = self.operator.bonds() {
-            multipliers
-                .into_iter()
-                .for_each(|lambda| problem.constraints.add_forces(&bonds, |kind| kind == Kind::Gluing, lambda));
-        }
-    }
-
-    /// The subdomains that supports hold still; `None` if no rank has any.
-    fn held<'s>(&'s self, problem: &'s TornProblem) -> Option<Held<'s>> {
-        let is_active = self.preconditioner.as_ref().is_some_and(|preconditioner| preconditioner.deluxe.is_active());
-        (is_active && !self.operator.is_hybrid()).then(|| Held {
-            factors: &self.operator.factors,
-            tangents: self.tangents.values(),
-            constraints: problem.constraints,
-            gather: problem.gather,
-        })
-    }
-
-    /// `torn = K^+ (torn - B' x)` and `y = B torn`.
-    fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64], timer: &Timer) {
-        timer.time("dual operator", || self.operator.respond(x, torn, y));
-        timer.count("dual operator", 0.0, self.operator.factors.bytes_per_solve());
-    }
-
-    /// Closes what the dual solver's tolerance left open in the held and the violated rows, at the least cost in energy
-    /// that the preconditioner knows.
-    fn mend(&mut self, problem: &TornProblem, slack: &[f64], du: &mut Torn, timer: &Timer) {
-        let (Some(preconditioner), Some(face)) = (&mut self.preconditioner, self.programs.face()) else { return };
-        let mut defect = vec![0.0; slack.len()];
-        problem.gather.apply(du, &mut defect);
-        defect.iter_mut().zip(slack).for_each(|(d, s)| *d = s - *d);
-        problem.constraints.laws().violation(&mut defect);
-        let kept = |row: usize| face.kept()[row] || defect[row] != 0.0;
-        timer.time("scaling", || preconditioner.scaling.restrict(problem.constraints, kept));
-        timer.time("preconditioner", || preconditioner.mend(&defect, du));
-    }
-
-    /// Assembles the tangents at `u` and factorises those that changed by more than `left`; returns how many, over all
-    /// ranks.
-    fn update_tangents(
+    /// Assembles the tangents at `u` and factorises those that changed by more than `left`; the preconditioner follows. Returns
+    /// the number of new factors over all ranks. Collective.
+    fn update(
         &mut self,
         problem: &TornProblem,
         (u, state): (&Torn, &State),
         left: f64,
         timer: &Timer,
-    ) -> Result<usize, String> {
-        let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
-        let (factorised, failure) =
-            self.tangents.update(&problem.regions(), (u, &state.yielding, &self.flows), left, &mut on);
-        agree_on(failure, problem)?;
-        if self.operator.is_hybrid() {
-            let loose = timer.time("clusters", || self.operator.update_clusters()).err();
-            let loose = loose.map(|own| problem.subdomains[own].id);
-            if let Some(subdomain) = first_of_all(loose, problem) {
-                return Err(format!(
-                    "the cluster of subdomain {subdomain} has no stiffness: set decomposition.cluster = 1"
-                ));
-            }
+    ) -> Result<usize, Singular> {
+        let Self { operator, preconditioner, flows, .. } = self;
+        let iterate = Iterate { regions: &problem.regions(), u, yielding: &state.yielding, flows };
+        let interiors = preconditioner.as_mut().map(Preconditioner::interiors);
+        let changes = operator.update(&iterate, left, interiors, problem.space, timer)?;
+        if let Some(preconditioner) = preconditioner {
+            let TornProblem { subdomains, constraints, space, .. } = problem;
+            preconditioner.update(operator, &changes, subdomains, constraints, space, timer)?;
         }
-        let is_weak =
-            |own| self.preconditioner.as_ref().is_some_and(|preconditioner| preconditioner.schur.is_weak(own));
-        let mine = factorised.iter().enumerate().flat_map(|(own, &fresh)| [fresh, f64::from(is_weak(own))]);
-        let all = problem.space.of_all(&mine.collect::<Vec<f64>>(), 2);
-        let (fresh, weak): (Vec<bool>, Vec<bool>) = all.as_chunks().0.iter().map(|[f, w]| (*f > 0.0, *w > 0.0)).unzip();
-        self.scale(problem, timer);
-        self.strengthen(problem, &weak, &fresh, timer)?;
-        Ok(fresh.into_iter().filter(|fresh| *fresh).count())
+        Ok(changes.fresh.into_iter().filter(|fresh| *fresh).count())
     }
 
-    /// Scales the rows by the stiffness of the tangents.
-    fn scale(&mut self, problem: &TornProblem, timer: &Timer) {
-        let Some(preconditioner) = &mut self.preconditioner else { return };
-        let (factors, values) = (&self.operator.factors, self.tangents.values().iter().enumerate());
-        let stiffness = values.map(|(own, values)| (&factors.symbolic(own).pattern, &values[..]));
-        preconditioner.scaling = timer.time("scaling", || Scaling::new(problem.constraints, problem.gather, stiffness));
+    /// `e = R'f_k`, and multipliers next to the `last` ones with `G lambda = e`. Collective.
+    fn start(&self, problem: &TornProblem, forces: &Torn, last: &[f64], timer: &Timer) -> Warm {
+        timer.time("coarse problem", || {
+            let coarse = self.projector.coarse();
+            let resultants = recover::resultants(problem.subdomains, problem.modes, coarse, forces);
+            self.programs.start(&self.projector, last, resultants)
+        })
     }
 
-    /// Deluxe scaling of faces beside weak subdomains, which supports hold still where they can; the preconditioner takes the
-    /// stiffness of both sides as it is now. Whether subdomains are `weak`, and their tangents `fresh`, is told of all.
-    fn strengthen(
+    /// `du` from the forces `f_k` and the multipliers that were `found`, to which it adds what the program does not see; `open` is
+    /// `c_k`. The subdomains' problems are solved to `wanted`, relative. Collective.
+    fn recover(
         &mut self,
         problem: &TornProblem,
-        weak: &[bool],
-        fresh: &[bool],
+        (forces, open): (&Torn, &[f64]),
+        found: &mut Found,
+        wanted: f64,
         timer: &Timer,
-    ) -> Result<(), String> {
-        let is_active = |preconditioner: &Preconditioner| preconditioner.deluxe.is_active();
-        if !weak.contains(&true) && !self.preconditioner.as_ref().is_some_and(is_active) {
-            return Ok(());
+    ) -> Recovered {
+        let constraints = problem.constraints;
+        let Found { lambda, balanced, .. } = found;
+
+        // K^+ (f_k - B'lambda), by the multipliers that are in balance, and what rounding leaves of K du = f_k - B'lambda.
+        let (mut du, mut defect) = (forces.clone(), vec![0.0; open.len()]);
+        self.respond(balanced, &mut du, &mut defect, timer);
+        self.operator.add_hidden(constraints, (forces, &du), [lambda, balanced]);
+        let mut local = forces.clone();
+        problem.gather.add_transpose(-1.0, balanced, &mut local);
+        let (local_residual, refined) = timer.time("refinement", || {
+            self.operator.inverse_mut().refine(&|x| problem.space.norm(x), (&local, &mut du), wanted)
+        });
+        if refined > 0 {
+            self.operator.inverse_mut().rejoin(&mut du);
+            self.operator.add_hidden(constraints, (forces, &du), [lambda, balanced]);
+            problem.gather.apply(&du, &mut defect);
         }
-        let may_hold = !self.operator.is_hybrid();
-        let Some(Preconditioner { deluxe, schur, .. }) = &self.preconditioner else { return Ok(()) };
-        let holds: Vec<bool> = (0..problem.subdomains.len()).map(|own| may_hold && schur.is_weak(own)).collect();
-        let beside: Vec<usize> = (0..problem.subdomains.len()).filter(|&own| deluxe.is_beside(own, weak)).collect();
-        let mut on = factorising(&mut self.operator, &mut self.preconditioner, timer);
-        let follow = |own: usize| self.tangents.follow(own, problem.subdomains[own].id, &mut on);
-        let followed = beside.into_iter().try_for_each(follow);
-        let hold = |(own, subdomain): (usize, &Subdomain)| {
-            let held = if holds[own] { &self.supported[own][..] } else { &[] };
-            self.tangents.hold(own, subdomain, held, &mut on)
-        };
-        let outcome = followed.and_then(|()| problem.subdomains.iter().enumerate().try_for_each(hold));
-        agree_on(outcome.err(), problem)?;
-        let Some(Preconditioner { deluxe, schur, .. }) = &mut self.preconditioner else { return Ok(()) };
-        let (factors, values) = (&self.operator.factors, self.tangents.values());
-        let stiffness = |own: usize| (&**factors.symbolic(own), &values[own][..]);
-        timer.time("faces", || deluxe.update(weak, fresh, schur, stiffness));
-        Ok(())
+
+        // R alpha, from B du - c_k in the rows that are kept.
+        defect.iter_mut().zip(open).for_each(|(d, c)| *d -= c);
+        if let Some(face) = self.programs.face() {
+            let coarse = self.projector.coarse();
+            let back = timer.time("coarse problem", || motion::amplitudes(face, coarse, problem.space, &defect));
+            recover::add_rigid_motion(problem.subdomains, problem.modes, coarse, -1.0, &back, &mut du);
+        }
+        Recovered { du, local_residual, refined }
+    }
+
+    /// `torn = K^+ (torn - B' x)` and `y = B torn`.
+    fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64], timer: &Timer) {
+        timer.time("dual operator", || self.operator.respond(x, torn, y));
+        timer.count("dual operator", 0.0, self.operator.bytes_per_apply());
     }
 }
 
-fn factorising<'s>(
-    operator: &'s mut DualOperator,
-    preconditioner: &'s mut Option<Preconditioner>,
-    timer: &'s Timer,
-) -> Factorising<'s> {
-    let schur = preconditioner.as_mut().map(|preconditioner| &mut preconditioner.schur);
-    Factorising { factors: &mut operator.factors, schur, timer }
-}
-
-/// One outcome for all ranks: the lowest failing subdomain speaks; ranks that see no failure repeat its number.
-fn agree_on(failure: Option<NotDefinite>, problem: &TornProblem) -> Result<(), String> {
-    let Some(subdomain) = first_of_all(failure.as_ref().map(|f| f.subdomain), problem) else { return Ok(()) };
-    let unknown = NotDefinite { subdomain, pivot: 0, dofs: 0 };
-    Err(failure.filter(|f| f.subdomain == subdomain).unwrap_or(unknown).to_string())
-}
-
-/// The lowest number that any rank names.
-fn first_of_all(mine: Option<usize>, problem: &TornProblem) -> Option<usize> {
-    let lowest = problem.space.maximum(mine.map_or(f64::NEG_INFINITY, |number| -(number as f64)));
-    (lowest != f64::NEG_INFINITY).then_some(-lowest as usize)
+/// A displacement from multipliers.
+struct Recovered {
+    du: Torn,
+    /// See [`Step::local_residual`].
+    local_residual: f64,
+    /// Applications of `K^+` in refinement.
+    refined: usize,
 }

@@ -16,6 +16,10 @@ use std::fmt;
 use super::Scene;
 use super::body::Axis;
 use super::surface::{Face, Support};
+use crate::span::independent;
+
+/// Shorter arms than this, in units of the extent, hold nothing.
+const SHORTEST_ARM: f64 = 1e-6;
 
 /// A rigid motion in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,9 +70,10 @@ impl Held {
     fn new(body: &str, rows: Vec<[f64; 6]>) -> Self {
         let translations = Axis::ALL.into_iter().map(Motion::Translation);
         let rotations = Axis::ALL.into_iter().map(Motion::Rotation);
-        // Translations come first, so a free column is a pure translation, or a rotation with the translation that moves
-        // its line to where the supports want it.
-        let motions = translations.chain(rotations).zip(pivot_columns(rows));
+        // Translations come first, so a column that depends on those before it is a pure translation, or a rotation with the
+        // translation that moves its line to where the supports want it.
+        let columns = (0..6).map(|motion| rows.iter().map(|row| row[motion]).collect()).collect();
+        let motions = translations.chain(rotations).zip(independent(columns, SHORTEST_ARM));
         Self { body: body.to_owned(), free: motions.filter(|(_, held)| !held).map(|(motion, _)| motion).collect() }
     }
 
@@ -115,30 +120,6 @@ fn row(x: [f64; 3], axis: Axis) -> [f64; 6] {
     row[3 + b] = x[c];
     row[3 + c] = -x[b];
     row
-}
-
-/// Shorter arms than this, in units of the extent, hold nothing.
-const SHORTEST_ARM: f64 = 1e-6;
-
-/// Gaussian elimination with pivoting among the rows.
-fn pivot_columns(mut rows: Vec<[f64; 6]>) -> [bool; 6] {
-    let mut is_pivot = [false; 6];
-    for column in 0..6 {
-        let size = |k: &usize| rows[*k][column].abs();
-        let Some(found) = (0..rows.len()).max_by(|a, b| size(a).total_cmp(&size(b))) else { break };
-        if size(&found) <= SHORTEST_ARM {
-            continue;
-        }
-        let pivot = rows.swap_remove(found);
-        is_pivot[column] = true;
-        for row in &mut rows {
-            let factor = row[column] / pivot[column];
-            for (entry, above) in row.iter_mut().zip(pivot) {
-                *entry -= factor * above;
-            }
-        }
-    }
-    is_pivot
 }
 
 #[cfg(test)]

@@ -6,78 +6,13 @@
 //! right-hand sides each does exactly what it would do beside any others. (The general kernels of faer are made for
 //! many right-hand sides.)
 
-use std::ops::{Add, Div, Neg, Sub};
-
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use pulp::{Arch, Simd, WithSimd};
 
+use super::number::{Number, WIDTH, Wide};
+
 /// Columns of a panel that are read together.
 const COLUMNS: usize = 4;
-/// Right-hand sides that are solved together, and partial sums of an inner product.
-pub const WIDTH: usize = 8;
-
-/// One unknown of several right-hand sides, or several unknowns of one.
-type Wide<T> = [T; WIDTH];
-
-/// What a factor's numbers are.
-pub(super) trait Number:
-    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Div<Output = Self> + Neg<Output = Self>
-{
-    /// Several numbers that the machine handles at a time: [`WIDTH`], or a part of them.
-    type Vector<S: Simd>: Copy;
-
-    /// `self * a + b`, rounded once.
-    fn fused(self, a: Self, b: Self) -> Self;
-
-    /// A vector of this number.
-    fn all<S: Simd>(self, simd: S) -> Self::Vector<S>;
-
-    /// `x * y + z`, rounded once.
-    fn add_product<S: Simd>(simd: S, x: Self::Vector<S>, y: Self::Vector<S>, z: Self::Vector<S>) -> Self::Vector<S>;
-
-    /// The vectors that a machine without a vector of [`WIDTH`] numbers has to take instead.
-    fn parts<S: Simd>(x: &Wide<Self>) -> &[Self::Vector<S>];
-
-    /// The same, to be overwritten.
-    fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [Self::Vector<S>];
-}
-
-macro_rules! number {
-    ($number:ty, $vector:ident, $lanes:ident, $splat:ident, $mul_add:ident, $as_simd:ident, $as_mut_simd:ident) => {
-        impl Number for $number {
-            type Vector<S: Simd> = S::$vector;
-
-            #[inline(always)]
-            fn fused(self, a: Self, b: Self) -> Self {
-                self.mul_add(a, b)
-            }
-
-            #[inline(always)]
-            fn all<S: Simd>(self, simd: S) -> S::$vector {
-                simd.$splat(self)
-            }
-
-            #[inline(always)]
-            fn add_product<S: Simd>(simd: S, x: S::$vector, y: S::$vector, z: S::$vector) -> S::$vector {
-                simd.$mul_add(x, y, z)
-            }
-
-            #[inline(always)]
-            fn parts<S: Simd>(x: &Wide<Self>) -> &[S::$vector] {
-                const { assert!(WIDTH.is_multiple_of(S::$lanes)) };
-                S::$as_simd(x).0
-            }
-
-            #[inline(always)]
-            fn parts_mut<S: Simd>(x: &mut Wide<Self>) -> &mut [S::$vector] {
-                S::$as_mut_simd(x).0
-            }
-        }
-    };
-}
-
-number!(f32, f32s, F32_LANES, splat_f32s, mul_add_f32s, as_simd_f32s, as_mut_simd_f32s);
-number!(f64, f64s, F64_LANES, splat_f64s, mul_add_f64s, as_simd_f64s, as_mut_simd_f64s);
 
 /// `x = (L L')^-1 x` in the order of elimination; `panel` is scratch.
 pub(super) fn solve<T: Number>(

@@ -5,12 +5,12 @@ use crate::decomposition::twins::{alike, twins};
 use crate::feti::Interconnection;
 use crate::feti::coarse::projector::Projector;
 use crate::feti::dual::operator::DualOperator;
-use crate::feti::dual::supported;
-use crate::feti::inverse::factor::{Factors, analyse};
+use crate::feti::inverse::Inverse;
+use crate::feti::inverse::factor::analyse;
 use crate::feti::inverse::hybrid::Hybrid;
+use crate::feti::inverse::pinnable;
 use crate::feti::inverse::schur::Schur;
 use crate::feti::preconditioner::Preconditioner;
-use crate::feti::preconditioner::deluxe::Deluxe;
 use crate::model::history::Stage;
 use crate::model::{self, Discrete, ModelError};
 use crate::monitor::timing::Timer;
@@ -50,17 +50,15 @@ pub(super) fn step_solver<'a>(
         scene::Preconditioner::Lumped => Some(schur(None)),
         scene::Preconditioner::Dirichlet => Some(schur(Some(precision))),
     };
-    let preconditioner = schur.map(|schur| {
-        let deluxe = Deluxe::new(comm, &decomposition.shares, constraints, gather, &schur);
-        Preconditioner::new(gather, schur, deluxe)
-    });
+    let preconditioner =
+        schur.map(|schur| Preconditioner::new(comm, &decomposition.shares, constraints, gather, schur));
     timer.time("coarse set-up", || model::held::at_all_stages(scene, discrete, &mut coarse, space, modes, stages))?;
     let hybrid = (!clusters.are_single())
         .then(|| timer.time("clusters", || Hybrid::new(clusters.of_rank(comm.rank()), subdomains)));
-    let operator = DualOperator::new(Factors::new(symbolic, precision), hybrid, gather);
-    let supported = supported::unknowns(constraints, gather, subdomains, modes);
-    let twins = twins(comm, subdomains);
-    Ok(StepSolver::new(operator, Projector { coarse }, preconditioner, programs(scene), twins, supported))
+    let pinnable = pinnable::unknowns(constraints, subdomains, modes);
+    let inverse = Inverse::new(symbolic, precision, hybrid, twins(comm, subdomains), pinnable);
+    let operator = DualOperator::new(inverse, gather);
+    Ok(StepSolver::new(operator, Projector::new(coarse), preconditioner, programs(scene)))
 }
 
 /// How the quadratic programs are solved.

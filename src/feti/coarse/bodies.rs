@@ -2,15 +2,15 @@
 //! of its half diagonal. Pieces of a body that have no face in common count as bodies, here. With `T_c` their share of the modes of cluster `c`, a row's force on a body is `T' G` of it,
 //! in which gluing cancels.
 
-use crate::vector::length;
 use std::collections::BTreeSet;
 use std::fmt;
 
 use super::factor::Blocks;
 use crate::comm::Comm;
 use crate::decomposition::{Clusters, Subdomain};
-use crate::feti::inverse::kernel::MODES;
-use crate::feti::inverse::kernel::RigidModes;
+use crate::feti::inverse::kernel::{MODES, RigidModes};
+use crate::span::complement;
+use crate::vector::{cross, length};
 
 /// `T` of all clusters, on every rank.
 pub struct BodyMotions {
@@ -130,10 +130,7 @@ impl BodyMotions {
             return (of, place, Motion::Translation(t.map(|x| x / moved)));
         }
         // Of a screw, the point of its axis that is nearest to the centre.
-        let arm = [0, 1, 2].map(|a| {
-            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-            half * (w[b] * t[c] - w[c] * t[b]) / (turned * turned)
-        });
+        let arm = cross(w, t).map(|x| half * x / (turned * turned));
         (
             of,
             place,
@@ -214,54 +211,6 @@ fn displacement((centre, half): &([f64; 3], f64), motion: usize, x: &[f64; 3]) -
     u
 }
 
-/// Vectors shorter than this share of the longest are nothing. They are squares of arms over a body's size: those below
-/// a hundred thousandth hold nothing.
-const NOTHING: f64 = 1e-10;
-
-/// An orthonormal basis of what is orthogonal to all `vectors` of `n` entries. Unit vectors come first.
-pub fn complement(vectors: &[Vec<f64>], n: usize) -> Vec<Vec<f64>> {
-    let square = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
-    let longest = vectors.iter().map(|v| square(v)).fold(0.0, f64::max);
-    let mut span: Vec<Vec<f64>> = Vec::new();
-    let mut rest = vectors.to_vec();
-    // The longest of what is left, again and again.
-    while let Some(next) = (0..rest.len()).max_by(|&a, &b| square(&rest[a]).total_cmp(&square(&rest[b]))) {
-        let mut direction = rest.swap_remove(next);
-        if square(&direction) <= NOTHING * NOTHING * longest {
-            break;
-        }
-        orthogonalise(&mut direction, &span);
-        rest.iter_mut().for_each(|v| orthogonalise_to(v, &direction));
-        span.push(direction);
-    }
-    let held = span.len();
-    let mut left: Vec<Vec<f64>> = (0..n).map(|k| (0..n).map(|i| f64::from(i == k)).collect()).collect();
-    left.iter_mut().for_each(|v| span.iter().for_each(|direction| orthogonalise_to(v, direction)));
-    while span.len() < n {
-        // Ties go to the first: translations of the first body.
-        let longest = left.iter().map(|v| square(v)).fold(0.0, f64::max);
-        let tied = |v: &Vec<f64>| square(v) >= (1.0 - PURE) * longest;
-        let next = left.iter().position(tied).expect("fewer directions than dimensions");
-        let mut direction = left.remove(next);
-        orthogonalise(&mut direction, &span);
-        left.iter_mut().for_each(|v| orthogonalise_to(v, &direction));
-        span.push(direction);
-    }
-    span.split_off(held)
-}
-
-/// Makes `v` a unit vector orthogonal to orthonormal ones.
-fn orthogonalise(v: &mut [f64], to: &[Vec<f64>]) {
-    to.iter().for_each(|direction| orthogonalise_to(v, direction));
-    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    v.iter_mut().for_each(|x| *x /= length);
-}
-
-fn orthogonalise_to(v: &mut [f64], direction: &[f64]) {
-    let along: f64 = v.iter().zip(direction).map(|(x, d)| x * d).sum();
-    v.iter_mut().zip(direction).for_each(|(x, d)| *x -= along * d);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -331,15 +280,5 @@ mod tests {
         });
         let slanted = Motion::Translation([-0.6, 0.8, 0.0]);
         assert_eq!(slanted.to_string(), "translation along (-0.600, 0.800, 0.000)");
-    }
-
-    #[test]
-    fn complements_are_orthonormal_and_prefer_unit_vectors() {
-        let vectors = [vec![0.0, 2.0, 0.0, 0.0], vec![0.0, 1.0, 0.0, 1e-14], vec![3.0, 0.0, -3.0, 0.0]];
-        let found = complement(&vectors, 4);
-        assert_eq!(found.len(), 2);
-        assert_eq!(found[0], [0.0, 0.0, 0.0, 1.0]);
-        assert!(found[1].iter().zip([0.5_f64.sqrt(), 0.0, 0.5_f64.sqrt(), 0.0]).all(|(a, b)| (a - b).abs() < 1e-15));
-        assert_eq!(complement(&[], 2), [[1.0, 0.0], [0.0, 1.0]]);
     }
 }

@@ -9,11 +9,12 @@
 //! Gaps play no part: a body may first have to move to where a contact holds it.
 
 use super::Coarse;
-use super::bodies::{Motion, complement};
+use super::bodies::Motion;
 use crate::constraint::Constraints;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
 use crate::qp::nnls;
+use crate::span::complement;
 use crate::vector::{dot, length};
 
 /// A motion that supports and contacts do not hold.

@@ -11,6 +11,7 @@ use super::bodies::BodyMotions;
 use super::factor::{Blocks, CoarseFactor};
 use super::{Coarse, Floating};
 use crate::feti::inverse::kernel::MODES;
+use crate::vector::{dot, length};
 
 /// The kept rows with their factor.
 pub struct CoarseFace {
@@ -57,10 +58,8 @@ impl CoarseFace {
     /// The part of the forces `e` on all clusters that the kept rows cannot balance, as a motion. Nothing if it is rounding
     /// beside forces of this size.
     pub fn unbalanced(&self, e: &[f64], size: f64) -> Option<Vec<f64>> {
-        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
         let along: Vec<f64> = self.free.iter().map(|motion| dot(motion, e)).collect();
-        let longest = |motion: &Vec<f64>| dot(motion, motion).sqrt();
-        let real = self.free.iter().zip(&along).any(|(motion, along)| along.abs() > BALANCED * size * longest(motion));
+        let real = self.free.iter().zip(&along).any(|(motion, along)| along.abs() > BALANCED * size * length(motion));
         real.then(|| {
             let mut motion = vec![0.0; e.len()];
             for (mode, along) in self.free.iter().zip(along) {
@@ -128,8 +127,8 @@ impl CoarseFace {
 
 /// `|P x|^2 = x'x - e'a` with `e = G x` and `a = (G G')^-1 e`.
 pub(super) fn without(square: f64, e: &[f64], a: &[f64]) -> f64 {
-    let rest = square - e.iter().zip(a).map(|(e, a)| e * a).sum::<f64>();
-    // What is not a number stays so.
+    let rest = square - dot(e, a);
+    // Not `max`: NaN must stay NaN.
     if rest < 0.0 { 0.0 } else { rest }
 }
 

@@ -12,7 +12,7 @@ use thiserror::Error;
 use super::bodies::BodyMotions;
 use super::factor::{Blocks, CoarseFactor, Symbolic};
 use crate::comm::{Comm, all_gather_u64};
-use crate::constraint::{Constraints, Kind};
+use crate::constraint::{Constraints, Kind, Row};
 use crate::decomposition::{Clusters, Subdomain};
 use crate::feti::dual::gather::Gather;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
@@ -40,12 +40,7 @@ pub struct Coarse<'a> {
     clusters: Clusters,
     /// Own clusters, as ranges of own subdomains.
     members: Vec<Range<usize>>,
-    /// Rows of `G'`: for each slot of each row, the cluster and its six modes' values. Gluing within a cluster has none.
-    slot_begin: Vec<u32>,
-    slot_cluster: Vec<u32>,
-    slot_modes: Vec<[f64; MODES]>,
-    /// Rows with slots.
-    moving: Vec<u32>,
+    transposed: Transposed,
     /// What acts on each own cluster, in row order: equalities, and inequalities.
     acting: [Vec<Vec<Acting>>; 2],
     /// `G G'` of the equalities, on every rank.
@@ -60,22 +55,27 @@ pub struct Coarse<'a> {
     factor: Option<CoarseFactor>,
 }
 
-impl<'a> Coarse<'a> {
-    /// Computes `G` of the clusters' `modes`, given for each own subdomain. Nothing is solved before [`Coarse::factorise`].
-    /// Collective.
-    pub fn new(
-        comm: &'a dyn Comm,
+/// `G'` by rows: for each slot of each row the cluster, and the values of its six modes. Gluing within a cluster has none.
+#[derive(Default)]
+struct Transposed {
+    /// First slot of each row, and the end.
+    begin: Vec<u32>,
+    cluster: Vec<u32>,
+    modes: Vec<[f64; MODES]>,
+    /// Rows with slots.
+    moving: Vec<u32>,
+}
+
+impl Transposed {
+    /// One neighbour exchange.
+    fn new(
         clusters: &Clusters,
         subdomains: &[Subdomain],
         modes: &[RigidModes],
         constraints: &Constraints,
         gather: &Gather,
     ) -> Self {
-        let first = clusters.shares.begin(comm.rank());
-        let members: Vec<Range<usize>> = clusters.of_rank(comm.rank()).collect();
-        let mut acting = [(); 2].map(|()| members.iter().map(|_| Vec::new()).collect::<Vec<Vec<Acting>>>());
-        let mut moving = Vec::new();
-        let (mut slot_begin, mut slot_cluster, mut slot_modes) = (vec![0], Vec::new(), Vec::new());
+        let mut result = Self { begin: vec![0], ..Self::default() };
         gather.exchange(
             MODES,
             |own, slots| {
@@ -87,34 +87,75 @@ impl<'a> Coarse<'a> {
                 }
             },
             |row, values| {
-                let begin = slot_cluster.len();
-                for (slot, six) in constraints.slots(row).zip(values.as_chunks::<MODES>().0) {
-                    let cluster = clusters.of(constraints.slot_subdomain[slot] as usize) as u32;
-                    // Copies of one node, unless it is contact.
-                    if constraints.rows[row].law().always_holds() && slot_cluster[begin..].last() == Some(&cluster) {
-                        let sum: &mut [f64; MODES] = slot_modes.last_mut().expect("it has a cluster");
-                        sum.iter_mut().zip(six).for_each(|(s, x)| *s += x);
-                    } else {
-                        slot_cluster.push(cluster);
-                        slot_modes.push(*six);
-                    }
-                }
-                if constraints.rows[row].kind == Kind::Gluing && slot_cluster.len() == begin + 1 {
-                    slot_cluster.truncate(begin);
-                    slot_modes.truncate(begin);
-                }
-                let acting = &mut acting[usize::from(!constraints.rows[row].law().always_holds())];
-                for (slot, &cluster) in (begin..).zip(&slot_cluster[begin..]) {
-                    if let Some(own) = (cluster as usize).checked_sub(first).filter(|&own| own < acting.len()) {
-                        acting[own].push(Acting { row: row as u32, modes: slot_modes[slot] });
-                    }
-                }
-                if slot_cluster.len() > begin {
-                    moving.push(row as u32);
-                }
-                slot_begin.push(slot_cluster.len() as u32);
+                let cluster = |slot: usize| clusters.of(constraints.slot_subdomain[slot] as usize) as u32;
+                let slots = constraints.slots(row).map(cluster).zip(values.as_chunks::<MODES>().0);
+                result.push(row, &constraints.rows[row], slots);
             },
         );
+        result
+    }
+
+    /// Adds the next row, with the clusters and modes' values of its slots.
+    fn push<'s>(&mut self, row: usize, of: &Row, slots: impl Iterator<Item = (u32, &'s [f64; MODES])>) {
+        let begin = self.cluster.len();
+        for (cluster, six) in slots {
+            // Copies of one node, unless it is contact.
+            let is_copy = of.law().always_holds() && self.cluster[begin..].last() == Some(&cluster);
+            if let Some(sum) = self.modes.last_mut().filter(|_| is_copy) {
+                sum.iter_mut().zip(six).for_each(|(s, x)| *s += x);
+            } else {
+                self.cluster.push(cluster);
+                self.modes.push(*six);
+            }
+        }
+        if of.kind == Kind::Gluing && self.cluster.len() == begin + 1 {
+            self.cluster.truncate(begin);
+            self.modes.truncate(begin);
+        }
+        if self.cluster.len() > begin {
+            self.moving.push(row as u32);
+        }
+        self.begin.push(self.cluster.len() as u32);
+    }
+
+    /// What acts on each of `count` own clusters, of which this is the `first`: equalities, and inequalities.
+    fn acting(&self, constraints: &Constraints, first: usize, count: usize) -> [Vec<Vec<Acting>>; 2] {
+        let mut acting = [(); 2].map(|()| (0..count).map(|_| Vec::new()).collect::<Vec<Vec<Acting>>>());
+        for (row, of) in constraints.rows.iter().enumerate() {
+            let acting = &mut acting[usize::from(!of.law().always_holds())];
+            for slot in self.slots(row) {
+                if let Some(own) = (self.cluster[slot] as usize).checked_sub(first).filter(|&own| own < count) {
+                    acting[own].push(Acting { row: row as u32, modes: self.modes[slot] });
+                }
+            }
+        }
+        acting
+    }
+
+    /// Number of rows.
+    fn rows(&self) -> usize {
+        self.begin.len() - 1
+    }
+
+    fn slots(&self, row: usize) -> Range<usize> {
+        self.begin[row] as usize..self.begin[row + 1] as usize
+    }
+}
+
+impl<'a> Coarse<'a> {
+    /// Computes `G` of the clusters' `modes`, given for each own subdomain. Nothing is solved before [`Coarse::factorise`].
+    /// Collective.
+    pub fn new(
+        comm: &'a dyn Comm,
+        clusters: &Clusters,
+        subdomains: &[Subdomain],
+        modes: &[RigidModes],
+        constraints: &Constraints,
+        gather: &Gather,
+    ) -> Self {
+        let members: Vec<Range<usize>> = clusters.of_rank(comm.rank()).collect();
+        let transposed = Transposed::new(clusters, subdomains, modes, constraints, gather);
+        let acting = transposed.acting(constraints, clusters.shares.begin(comm.rank()), members.len());
         Self {
             comm,
             motions: BodyMotions::new(comm, clusters, subdomains, modes),
@@ -122,10 +163,7 @@ impl<'a> Coarse<'a> {
             members,
             unit: constraints.rows.iter().map(|row| (row.length * row.length).recip()).collect(),
             uneven: constraints.uneven,
-            slot_begin,
-            slot_cluster,
-            slot_modes,
-            moving,
+            transposed,
             acting,
             equalities: OnceCell::new(),
             symbolic: OnceCell::new(),
@@ -195,7 +233,7 @@ impl<'a> Coarse<'a> {
 
     /// `G' motion` of all rows, of six numbers a cluster. Local.
     pub fn moved(&self, motion: &[f64]) -> Vec<f64> {
-        let mut rows = vec![0.0; self.slot_begin.len() - 1];
+        let mut rows = vec![0.0; self.transposed.rows()];
         self.add_transpose(1.0, motion, &mut rows);
         rows
     }
@@ -208,8 +246,8 @@ impl<'a> Coarse<'a> {
     /// Force of a row's unit multiplier on the bodies, six numbers each. Local.
     pub fn force_on_bodies(&self, row: usize) -> Vec<f64> {
         let mut forces = vec![0.0; MODES * self.motions.bodies()];
-        for slot in self.slots(row) {
-            self.motions.add_force(self.slot_cluster[slot] as usize, &self.slot_modes[slot], &mut forces);
+        for slot in self.transposed.slots(row) {
+            self.motions.add_force(self.transposed.cluster[slot] as usize, &self.transposed.modes[slot], &mut forces);
         }
         forces
     }
@@ -232,8 +270,8 @@ impl<'a> Coarse<'a> {
                     continue;
                 }
                 let modes = modes.map(|g| weight * g);
-                for other in self.slots(*row as usize) {
-                    let column = self.slot_cluster[other];
+                for other in self.transposed.slots(*row as usize) {
+                    let column = self.transposed.cluster[other];
                     if column as usize > cluster {
                         continue;
                     }
@@ -243,7 +281,7 @@ impl<'a> Coarse<'a> {
                         columns.len() - 1
                     });
                     for (a, products) in modes.iter().zip(blocks[at].as_chunks_mut::<MODES>().0) {
-                        products.iter_mut().zip(&self.slot_modes[other]).for_each(|(p, b)| *p += a * b);
+                        products.iter_mut().zip(&self.transposed.modes[other]).for_each(|(p, b)| *p += a * b);
                     }
                 }
             }
@@ -255,10 +293,6 @@ impl<'a> Coarse<'a> {
         let all = all_gather_u64(self.comm, &message);
         let blocks = all.as_chunks::<{ 2 + MODES * MODES }>().0.iter();
         blocks.map(|&[row, column, block @ ..]| ((row as usize, column as usize), block.map(f64::from_bits))).collect()
-    }
-
-    fn slots(&self, row: usize) -> std::ops::Range<usize> {
-        self.slot_begin[row] as usize..self.slot_begin[row + 1] as usize
     }
 
     /// `G rows`, whole on every rank. One all-gather.
@@ -331,9 +365,9 @@ impl<'a> Coarse<'a> {
     /// `rows += factor G' a`. Local.
     pub fn add_transpose(&self, factor: f64, a: &[f64], rows: &mut [f64]) {
         let a = a.as_chunks::<MODES>().0;
-        for &row in &self.moving {
-            let of_slot = |slot: usize| dot(&self.slot_modes[slot], &a[self.slot_cluster[slot] as usize]);
-            rows[row as usize] += factor * self.slots(row as usize).map(of_slot).sum::<f64>();
+        for &row in &self.transposed.moving {
+            let of_slot = |slot: usize| dot(&self.transposed.modes[slot], &a[self.transposed.cluster[slot] as usize]);
+            rows[row as usize] += factor * self.transposed.slots(row as usize).map(of_slot).sum::<f64>();
         }
     }
 }

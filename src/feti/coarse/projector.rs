@@ -5,11 +5,20 @@ use super::face::without;
 
 /// The natural coarse grid projector.
 pub struct Projector<'a> {
-    /// The coarse problem.
-    pub coarse: Coarse<'a>,
+    coarse: Coarse<'a>,
 }
 
-impl Projector<'_> {
+impl<'a> Projector<'a> {
+    /// On a coarse problem that is factorised.
+    pub fn new(coarse: Coarse<'a>) -> Self {
+        Self { coarse }
+    }
+
+    /// The coarse problem.
+    pub fn coarse(&self) -> &Coarse<'a> {
+        &self.coarse
+    }
+
     /// `rows = P rows`; returns `(G G')^-1 G rows`. One all-gather.
     pub fn project(&self, rows: &mut [f64]) -> Vec<f64> {
         let mut a = self.coarse.apply(rows);
@@ -48,7 +57,7 @@ mod tests {
     }
 
     fn projector<'a>(setup: &Setup<'a>) -> Projector<'a> {
-        Projector { coarse: setup.coarse().expect("the bodies are held") }
+        Projector::new(setup.coarse().expect("the bodies are held"))
     }
 
     fn norm(v: &[f64]) -> f64 {

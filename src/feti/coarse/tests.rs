@@ -77,7 +77,7 @@ fn coarse_products_and_solutions_are_the_same_bits_on_any_ranks() {
             });
         }
         same_on_any_ranks(&scene, |setup| {
-            let projector = Projector { coarse: setup.coarse().expect("the bodies are held") };
+            let projector = Projector::new(setup.coarse().expect("the bodies are held"));
             let mut rows = setup.multipliers(2);
             projector.project(&mut rows);
             setup.owned(&rows)

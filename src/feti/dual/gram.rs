@@ -145,7 +145,7 @@ impl Gram {
         }
     }
 
-    /// Forgets what another [`Gram::factorise`] would need.
+    /// Frees what only another [`Gram::factorise`] would need: the factor is final.
     pub fn settle(&mut self) {
         (self.sites, self.products) = Default::default();
     }

@@ -1,62 +1,151 @@
 //! `F = B K^+ B'`, applied subdomain by subdomain through the factors, or cluster by cluster.
 
+use thiserror::Error;
+
 use super::gather::Gather;
+use super::pinned::Pinned;
+use super::space::RowSpace;
+use crate::assembly::Region;
+use crate::constraint::{Constraints, Kind};
+use crate::decomposition::Subdomain;
 use crate::feti::Torn;
-use crate::feti::inverse::factor::Factors;
-use crate::feti::inverse::hybrid::Hybrid;
+use crate::feti::inverse::Inverse;
+use crate::feti::inverse::basis::Bases;
+use crate::feti::inverse::factor::NotDefinite;
+use crate::feti::inverse::schur::Schur;
+use crate::feti::inverse::tangents::Iterate;
+use crate::monitor::timing::Timer;
+use crate::sparse::cholesky::Precision;
+
+/// A tangent has no generalised inverse; the same on every rank.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum Singular {
+    /// That of a subdomain is singular beyond its rigid motions.
+    #[error(transparent)]
+    Subdomain(#[from] NotDefinite),
+    /// Nothing holds the members of a cluster together.
+    #[error("the cluster of subdomain {subdomain} has no stiffness: set decomposition.cluster = 1")]
+    Cluster {
+        /// The first of the cluster.
+        subdomain: usize,
+    },
+}
+
+/// What an update changed, of all subdomains on every rank.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Changes {
+    /// Whether the tangent is a new one.
+    pub fresh: Vec<bool>,
+    /// Whether the interior is weak ([`Schur::is_weak`]); never without a preconditioner.
+    pub weak: Vec<bool>,
+}
 
 /// The dual operator; counts its applications.
 pub struct DualOperator<'a> {
-    /// Factors of all own subdomains.
-    pub factors: Factors,
-    hybrid: Option<Hybrid>,
+    inverse: Inverse,
     gather: &'a Gather<'a>,
     torn: Torn,
     applications: usize,
 }
 
 impl<'a> DualOperator<'a> {
-    /// On factors that will be computed before the first application, with clusters if there are any.
-    pub fn new(factors: Factors, hybrid: Option<Hybrid>, gather: &'a Gather<'a>) -> Self {
-        Self { factors, hybrid, gather, torn: gather.zeros(), applications: 0 }
+    /// On a generalised inverse, which gets its numbers by [`DualOperator::update`].
+    pub fn new(inverse: Inverse, gather: &'a Gather<'a>) -> Self {
+        Self { inverse, gather, torn: gather.zeros(), applications: 0 }
     }
 
-    /// Whether there are clusters.
-    pub fn is_hybrid(&self) -> bool {
-        self.hybrid.is_some()
+    /// `K^+`.
+    pub fn inverse(&self) -> &Inverse {
+        &self.inverse
     }
 
-    /// Makes the clusters follow the factors.
+    /// `K^+`, to be applied by itself.
+    pub fn inverse_mut(&mut self) -> &mut Inverse {
+        &mut self.inverse
+    }
+
+    /// Takes over the tangents at an iterate, see [`Inverse::update`]. Collective.
     ///
     /// # Errors
-    /// An own subdomain of a cluster whose members nothing holds together.
-    pub fn update_clusters(&mut self) -> Result<(), usize> {
-        self.hybrid.as_mut().map_or(Ok(()), |hybrid| hybrid.update(&mut self.factors))
+    /// If one is singular.
+    pub fn update(
+        &mut self,
+        iterate: &Iterate,
+        left: f64,
+        mut interiors: Option<&mut Schur>,
+        space: &RowSpace,
+        timer: &Timer,
+    ) -> Result<Changes, Singular> {
+        let fresh = agree(self.inverse.update(iterate, left, interiors.as_deref_mut(), timer), space)?;
+        if self.inverse.is_hybrid() {
+            let loose = self.inverse.update_clusters(timer).err().map(|own| iterate.regions[own].subdomain.id);
+            space.lowest(loose).map_or(Ok(()), |subdomain| Err(Singular::Cluster { subdomain }))?;
+        }
+        let is_weak = |own| interiors.as_ref().is_some_and(|schur| schur.is_weak(own));
+        let of_own = |(own, fresh): (usize, bool)| [fresh, is_weak(own)].map(|is| f64::from(u8::from(is)));
+        let mine: Vec<f64> = fresh.into_iter().enumerate().flat_map(of_own).collect();
+        let all = space.of_all(&mine, 2);
+        let (fresh, weak) = all.as_chunks().0.iter().map(|[fresh, weak]| (*fresh > 0.0, *weak > 0.0)).unzip();
+        Ok(Changes { fresh, weak })
     }
 
-    /// `torn = K^+ torn`, of clusters if there are any. Local.
-    pub fn invert(&mut self, torn: &mut Torn) {
-        match &mut self.hybrid {
-            Some(hybrid) => hybrid.solve(&mut self.factors, torn),
-            None => self.factors.solve(torn),
+    /// As [`Inverse::remake`]. Collective.
+    ///
+    /// # Errors
+    /// If a tangent is singular.
+    pub fn remake(
+        &mut self,
+        regions: &[Region],
+        made_of: (Precision, Vec<Bases>),
+        interiors: Option<&mut Schur>,
+        space: &RowSpace,
+        timer: &Timer,
+    ) -> Result<(), Singular> {
+        agree(self.inverse.remake(regions, made_of, interiors, timer), space)
+    }
+
+    /// As [`Inverse::strengthen`]. Collective.
+    ///
+    /// # Errors
+    /// If a block is singular.
+    pub fn strengthen(
+        &mut self,
+        subdomains: &[Subdomain],
+        (beside, is_any_weak): (&[usize], bool),
+        interiors: &mut Schur,
+        space: &RowSpace,
+        timer: &Timer,
+    ) -> Result<(), Singular> {
+        agree(self.inverse.strengthen(subdomains, beside, is_any_weak, interiors, timer), space)
+    }
+
+    /// The subdomains with unknowns that are kept at zero; `None` if no rank has any.
+    pub fn pinned<'s>(&'s self, constraints: &'s Constraints) -> Option<Pinned<'s>> {
+        self.inverse.pins().then(|| Pinned::new(&self.inverse, constraints, self.gather))
+    }
+
+    /// Adds to multipliers, which balance each cluster, what balances each of its members: the forces by which these held each
+    /// other in the last [`Inverse::solve`] or [`Inverse::rejoin`]. One neighbour exchange with clusters, none without.
+    pub fn add_bonds<const N: usize>(&self, constraints: &Constraints, multipliers: [&mut Vec<f64>; N]) {
+        if !self.inverse.is_hybrid() {
+            return;
+        }
+        let mut torn = self.gather.zeros();
+        self.inverse.add_bond_forces(&mut torn);
+        let mut rows = vec![0.0; self.gather.rows()];
+        self.gather.apply(&torn, &mut rows);
+        for lambda in multipliers {
+            constraints.add_forces(&rows, |kind| kind == Kind::Gluing, lambda);
         }
     }
 
-    /// Closes the bonds of clusters in a displacement; see [`Hybrid::rejoin`]. Local.
-    pub fn rejoin(&mut self, torn: &mut Torn) {
-        self.hybrid.iter_mut().for_each(|hybrid| hybrid.rejoin(torn));
-    }
-
-    /// By `B`, the forces by which the members of clusters held each other in the last [`DualOperator::invert`] or
-    /// [`DualOperator::rejoin`]: added to multipliers that balance clusters, they balance each subdomain. `None` without
-    /// clusters. One neighbour exchange.
-    pub fn bonds(&self) -> Option<Vec<f64>> {
-        let hybrid = self.hybrid.as_ref()?;
-        let mut torn = self.gather.zeros();
-        hybrid.add_forces(&mut torn);
-        let mut rows = vec![0.0; self.gather.rows()];
-        self.gather.apply(&torn, &mut rows);
-        Some(rows)
+    /// Adds to multipliers what no quadratic program sees: [`DualOperator::add_bonds`] and [`Pinned::add_reactions`], after the
+    /// displacement `du` under `forces`. The last of the multipliers are in balance.
+    pub fn add_hidden(&self, constraints: &Constraints, at: (&Torn, &Torn), [lambda, balanced]: [&mut Vec<f64>; 2]) {
+        self.add_bonds(constraints, [&mut *lambda, &mut *balanced]);
+        if let Some(pinned) = self.pinned(constraints) {
+            pinned.add_reactions(at, [lambda, balanced]);
+        }
     }
 
     /// `y = F x`. One neighbour exchange.
@@ -66,17 +155,15 @@ impl<'a> DualOperator<'a> {
             local.fill(0.0);
             self.gather.add_transpose_one(own, 1.0, x, local);
         }
-        let mut torn = std::mem::take(&mut self.torn);
-        self.invert(&mut torn);
-        self.gather.apply(&torn, y);
-        self.torn = torn;
+        self.inverse.solve(&mut self.torn);
+        self.gather.apply(&self.torn, y);
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`: costs and counts as one application of F.
     pub fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64]) {
         self.applications += 1;
         self.gather.add_transpose(-1.0, x, torn);
-        self.invert(torn);
+        self.inverse.solve(torn);
         self.gather.apply(torn, y);
     }
 
@@ -84,6 +171,20 @@ impl<'a> DualOperator<'a> {
     pub fn applications(&self) -> usize {
         self.applications
     }
+
+    /// Bytes of factors that one application reads.
+    pub fn bytes_per_apply(&self) -> f64 {
+        self.inverse.bytes_per_solve()
+    }
+}
+
+/// One outcome for all ranks: the lowest failing subdomain speaks; ranks that see no failure repeat its number.
+fn agree<T>(outcome: Result<T, NotDefinite>, space: &RowSpace) -> Result<T, Singular> {
+    let Some(subdomain) = space.lowest(outcome.as_ref().err().map(|failure| failure.subdomain)) else {
+        return outcome.map_err(Singular::from);
+    };
+    let unknown = NotDefinite { subdomain, pivot: 0, dofs: 0 };
+    Err(outcome.err().filter(|failure| failure.subdomain == subdomain).unwrap_or(unknown).into())
 }
 
 #[cfg(test)]

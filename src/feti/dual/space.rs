@@ -5,6 +5,8 @@
 
 use crate::comm::{Comm, Shares, all_gather_u64, maximum, ordered_sum};
 use crate::constraint::Constraints;
+use crate::feti::Torn;
+use crate::vector::dot;
 
 /// Inner products over all rows of all ranks.
 pub struct RowSpace<'a> {
@@ -79,6 +81,18 @@ impl<'a> RowSpace<'a> {
             .collect();
         let numbers: Vec<f64> = all_gather_u64(self.comm, &mine).into_iter().map(f64::from_bits).collect();
         numbers.chunks_exact(width).map(<[f64]>::to_vec).collect()
+    }
+
+    /// Euclidean norm of a torn vector. Collective.
+    pub fn norm(&self, x: &Torn) -> f64 {
+        let squares: Vec<f64> = x.iter().map(|x| dot(x, x)).collect();
+        self.sum(&squares, 1)[0].sqrt()
+    }
+
+    /// The lowest number that any rank names. Collective.
+    pub fn lowest(&self, mine: Option<usize>) -> Option<usize> {
+        let lowest = self.maximum(mine.map_or(f64::NEG_INFINITY, |number| -(number as f64)));
+        (lowest != f64::NEG_INFINITY).then_some(-lowest as usize)
     }
 
     /// Largest value over the ranks; NaN if any is.

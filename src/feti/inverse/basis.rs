@@ -1,4 +1,5 @@
-//! What the kept factors were made of: little beside the factors themselves, and enough to make them again.
+//! From which states the kept factors were made. They take little memory beside the factors, and factors can be made again from
+//! them, to the same bits: for a restart.
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ pub enum Basis {
     At(Arc<Vec<f64>>, Flow),
 }
 
-/// The factors of a subdomain.
+/// The states of a subdomain's factors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bases {
     /// Of the whole tangent; `None` if there is no factor to go on with.
@@ -30,7 +31,8 @@ impl Bases {
         self.factor == Some(Basis::Elastic)
     }
 
-    /// What is made of displacements cannot be made again once their history has changed.
+    /// Another state is committed: factors of plastic tangents, which depend on the former history, cannot be made again and
+    /// are dropped.
     pub fn commit(&mut self) {
         let is_plastic = |basis: &Option<Basis>| matches!(basis, Some(Basis::At(..)));
         if is_plastic(&self.factor) || is_plastic(&self.interior) {

@@ -93,20 +93,20 @@ pub struct Factors {
     precision: Precision,
     workspace: Workspace,
     shifted: Vec<f64>,
-    /// What tells factors apart: equal numbers, equal factors.
+    /// A number for each own subdomain; factors with the same number are the same.
     stamps: Vec<u64>,
     made: u64,
-    /// Unknowns of each own subdomain that are kept at zero.
-    held: Vec<Vec<u32>>,
+    /// Unknowns of each own subdomain that its factor keeps at zero.
+    pinned: Vec<Vec<u32>>,
 }
 
 impl Factors {
-    /// Space for the factors; nothing is factorised yet. Of single precision are those that pass a probe.
+    /// Space for the factors; nothing is factorised yet. With single `precision`, a factor that fails a probe is made again in double.
     pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
         let factors = Stock::new(symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)));
-        let (stamps, held) = (vec![0; symbolic.len()], vec![Vec::new(); symbolic.len()]);
-        Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0, held }
+        let (stamps, pinned) = (vec![0; symbolic.len()], vec![Vec::new(); symbolic.len()]);
+        Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0, pinned }
     }
 
     /// Symbolic analysis of an own subdomain.
@@ -139,19 +139,19 @@ impl Factors {
         self.take(own, subdomain, stiffness, Vec::new(), common)
     }
 
-    /// As [`Factors::factorise`], with these unknowns kept at zero, which leave no rigid motion: in place of `K + rho Q`, the rest
-    /// of `K`. See [`crate::feti::dual::supported`].
+    /// As [`Factors::factorise`], but keeps these unknowns at zero: factorises the rest of `K` in place of `K + rho Q`. They must
+    /// leave no rigid motion free, see [`super::pinnable`].
     ///
     /// # Errors
     /// As there.
-    pub fn hold(
+    pub fn pin(
         &mut self,
         own: usize,
         subdomain: &Subdomain,
         stiffness: &[f64],
-        held: &[u32],
+        pinned: &[u32],
     ) -> Result<(), NotDefinite> {
-        self.take(own, subdomain, stiffness, held.to_vec(), false)
+        self.take(own, subdomain, stiffness, pinned.to_vec(), false)
     }
 
     /// The least pivot of the factor of an own subdomain, relative to the diagonal entry of its `stiffness` there.
@@ -160,9 +160,9 @@ impl Factors {
         cholesky.least_pivot(self.factors.of(own), |dof| stiffness[pattern.column_begin[dof] as usize])
     }
 
-    /// Unknowns of an own subdomain that are kept at zero, ascending.
-    pub fn held(&self, own: usize) -> &[u32] {
-        &self.held[own]
+    /// Unknowns of an own subdomain that its factor keeps at zero, ascending.
+    pub fn pinned(&self, own: usize) -> &[u32] {
+        &self.pinned[own]
     }
 
     fn take(
@@ -170,7 +170,7 @@ impl Factors {
         own: usize,
         subdomain: &Subdomain,
         stiffness: &[f64],
-        held: Vec<u32>,
+        pinned: Vec<u32>,
         common: bool,
     ) -> Result<(), NotDefinite> {
         let Symbolic { pattern, fixing, cholesky, .. } = &*self.symbolic[own];
@@ -179,12 +179,12 @@ impl Factors {
         self.shifted.extend_from_slice(stiffness);
         let diagonal = pattern.diagonal(stiffness);
         let rho = diagonal.iter().sum::<f64>() / n as f64;
-        if held.is_empty() {
+        if pinned.is_empty() {
             add_fixing(pattern, fixing, &subdomain.shape, rho, &mut self.shifted);
         } else {
-            pattern.uncouple(&held, &mut self.shifted);
+            pattern.uncouple(&pinned, &mut self.shifted);
         }
-        self.held[own] = held;
+        self.pinned[own] = pinned;
         let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
         if !rho.is_finite() {
             return Err(refuse(0));
@@ -210,11 +210,11 @@ impl Factors {
     /// From now on an own subdomain has the factor of a congruent one with equal stiffness.
     pub fn share(&mut self, own: usize, twin: usize) {
         self.factors.share(own, twin, true);
-        self.held[own].clear();
+        self.pinned[own].clear();
         self.stamps[own] = self.stamps[twin];
     }
 
-    /// A number that is the same as before, or as that of another, as long as the factor is.
+    /// A number of the factor of an own subdomain. Equal numbers mean equal factors, of one subdomain over time or of two.
     pub fn stamp(&self, own: usize) -> u64 {
         self.stamps[own]
     }
@@ -246,7 +246,7 @@ impl Factors {
         for batch in self.factors.batches() {
             match batch {
                 &Batch::Alone(own) => {
-                    self.held[own].iter().for_each(|&dof| x[own][dof as usize] = 0.0);
+                    self.pinned[own].iter().for_each(|&dof| x[own][dof as usize] = 0.0);
                     self.workspace.solve(&self.symbolic[own].cholesky, self.factors.of(own), &mut x[own]);
                 }
                 Batch::Twins(twins) => {

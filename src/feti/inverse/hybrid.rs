@@ -2,7 +2,7 @@
 //!
 //! Members of a cluster are bound by the averages of [`bonds`] for good, so that a cluster has six rigid motions and the
 //! coarse problem six unknowns a cluster; all else between them is left to the multipliers. `K~^+` is local to each
-//! cluster: the members' own `K^+`, and a dense problem of the bonds ([`inverse`]). Multipliers along the bonds' rows
+//! cluster: the members' own `K^+`, and a dense problem of the bonds ([`dense`]). Multipliers along the bonds' rows
 //! move nothing, which conjugate gradients do not mind: right-hand sides have no part there.
 //!
 //! Klawonn and Rheinbach, "Highly scalable parallel domain decomposition methods with an application to biomechanics", ZAMM 90
@@ -10,14 +10,14 @@
 //! total FETI solver", Adv. Eng. Software 112 (2017), hybrid Total FETI.
 
 pub mod bonds;
-pub mod inverse;
+pub mod dense;
 
 use std::collections::HashMap;
 use std::ops::Range;
 use std::rc::Rc;
 
 use self::bonds::{Bonds, Kinds};
-use self::inverse::Inverse;
+use self::dense::DenseProblem;
 use super::factor::Factors;
 use super::kernel::MODES;
 use crate::decomposition::Subdomain;
@@ -32,7 +32,7 @@ struct Cluster {
     bonds: Rc<Bonds>,
     /// Which factors the inverse is of.
     stamps: Vec<u64>,
-    inverse: Option<Rc<Inverse>>,
+    inverse: Option<Rc<DenseProblem>>,
     /// Of the last solve.
     multipliers: Vec<f64>,
 }
@@ -56,7 +56,7 @@ impl Hybrid {
     /// # Errors
     /// An own subdomain of a cluster whose bonds have no inverse.
     pub fn update(&mut self, factors: &mut Factors) -> Result<(), usize> {
-        let mut known: HashMap<(*const Bonds, Vec<u64>), Rc<Inverse>> = HashMap::new();
+        let mut known: HashMap<(*const Bonds, Vec<u64>), Rc<DenseProblem>> = HashMap::new();
         let mut responses: HashMap<(*const Bonds, usize, u64), Rc<Vec<f64>>> = HashMap::new();
         for cluster in &self.0 {
             let Some(inverse) = &cluster.inverse else { continue };
@@ -80,7 +80,7 @@ impl Hybrid {
                 let response = responses.entry((kind, member, stamp));
                 Rc::clone(response.or_insert_with(|| Rc::new(response_of(factors, bonds, member, own))))
             });
-            let new = Rc::new(Inverse::new(bonds, of_members.collect()).ok_or(members.start)?);
+            let new = Rc::new(DenseProblem::new(bonds, of_members.collect()).ok_or(members.start)?);
             known.insert((kind, now.clone()), Rc::clone(&new));
             (*stamps, *inverse) = (now, Some(new));
         }

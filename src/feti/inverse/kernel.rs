@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use crate::decomposition::Subdomain;
+use crate::vector::{cross, difference, dot};
 
 /// Rigid modes of a subdomain, or of a cluster.
 pub const MODES: usize = 6;
@@ -29,14 +30,12 @@ impl RigidModes {
 
     /// The modes' displacements at a point, `[component][mode]`.
     pub fn at(&self, point: [f64; 3]) -> [[f64; 6]; 3] {
-        let arm: [f64; 3] = std::array::from_fn(|a| point[a] - self.centre[a]);
+        let arm = difference(point, self.centre);
+        let turned = self.axes.map(|axis| cross(axis, arm));
         let mut modes = [[0.0; 6]; 3];
         for (a, row) in modes.iter_mut().enumerate() {
             row[a] = self.translation;
-            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-            for (k, axis) in self.axes.iter().enumerate() {
-                row[3 + k] = axis[b] * arm[c] - axis[c] * arm[b];
-            }
+            turned.iter().enumerate().for_each(|(k, turned)| row[3 + k] = turned[a]);
         }
         modes
     }
@@ -77,8 +76,8 @@ pub fn inertia(points: &[[f64; 3]]) -> ([f64; 3], [[f64; 3]; 3]) {
     let centre: [f64; 3] = std::array::from_fn(|a| points.iter().map(|p| p[a]).sum::<f64>() / points.len() as f64);
     let mut moments = [[0.0; 3]; 3];
     for point in points {
-        let arm: [f64; 3] = std::array::from_fn(|a| point[a] - centre[a]);
-        let square: f64 = arm.iter().map(|x| x * x).sum();
+        let arm = difference(*point, centre);
+        let square = dot(arm, arm);
         for a in 0..3 {
             for b in 0..3 {
                 moments[a][b] += if a == b { square } else { 0.0 } - arm[a] * arm[b];

@@ -1,15 +1,209 @@
 //! The generalised inverse `K^+` of the torn stiffness, its kernel `R`, and which factors are made when.
 //!
+//! [`Inverse`] is the whole: set up in [`Inverse::new`], given its numbers by [`Inverse::update`], applied by [`Inverse::solve`].
 //! [`kernel`] has the rigid modes, [`factor`] the factors of whole subdomains, [`schur`] those of their interiors with the Schur
-//! complement, [`stock`] the scratch that their solves share. [`tangents`] decides which of them are kept, shared or made
-//! again, from what they are made of ([`basis`]); [`refine`] makes up for the digits that they lack. [`hybrid`] joins subdomains
-//! to clusters.
+//! complement, [`stock`] the scratch that their solves share. [`tangents`] decides which factors are kept, shared or made
+//! again, from what they are made of ([`basis`]); [`refine`] makes up for the digits that they lack. [`pinnable`] finds unknowns
+//! that factors may keep at zero. [`hybrid`] joins subdomains to clusters.
+//!
+//! All here is local to a rank.
 
 pub mod basis;
 pub mod factor;
 pub mod hybrid;
 pub mod kernel;
+pub mod pinnable;
 pub mod refine;
 pub mod schur;
 pub mod stock;
 pub mod tangents;
+
+use std::rc::Rc;
+
+use self::basis::Bases;
+use self::factor::{Factors, NotDefinite, Symbolic};
+use self::hybrid::Hybrid;
+use self::schur::Schur;
+use self::tangents::{Factorising, Iterate, Tangents};
+use super::Torn;
+use crate::assembly::Region;
+use crate::decomposition::Subdomain;
+use crate::monitor::timing::Timer;
+use crate::sparse::cholesky::Precision;
+
+/// `K^+` of one rank's subdomains, or of their clusters.
+pub struct Inverse {
+    factors: Factors,
+    tangents: Tangents,
+    hybrid: Option<Hybrid>,
+    /// For each own subdomain, unknowns that its factor may keep at zero ([`pinnable`]).
+    pinnable: Vec<Vec<u32>>,
+    /// Whether the factor of any subdomain, on any rank, may keep unknowns at zero now.
+    pins: bool,
+}
+
+impl Inverse {
+    /// Of subdomains with these analyses, of clusters if there are any. Factors are in single `precision` where a probe lets
+    /// them. `twins` numbers subdomains that have congruent ones; of `pinnable` see [`pinnable::unknowns`]. Nothing is factorised
+    /// before [`Inverse::update`].
+    pub fn new(
+        symbolic: Vec<Rc<Symbolic>>,
+        precision: Precision,
+        hybrid: Option<Hybrid>,
+        twins: Vec<Option<usize>>,
+        pinnable: Vec<Vec<u32>>,
+    ) -> Self {
+        let (factors, tangents) = (Factors::new(symbolic, precision), Tangents::new(twins));
+        Self { factors, tangents, hybrid, pinnable, pins: false }
+    }
+
+    /// Assembles the tangents `K_k` at an iterate and factorises those whose entries changed by more than `left`, relative to
+    /// their diagonal; with them the `interiors` of the preconditioner, if there is one. Clusters follow by
+    /// [`Inverse::update_clusters`]. Returns for each own subdomain whether its tangent is a new one.
+    ///
+    /// # Errors
+    /// The first tangent that is singular. Those behind it keep their factors.
+    pub fn update(
+        &mut self,
+        iterate: &Iterate,
+        left: f64,
+        interiors: Option<&mut Schur>,
+        timer: &Timer,
+    ) -> Result<Vec<bool>, NotDefinite> {
+        self.pins = false;
+        self.tangents.update(iterate, left, &mut Factorising { factors: &mut self.factors, schur: interiors, timer })
+    }
+
+    /// Makes the clusters follow the factors of their members.
+    ///
+    /// # Errors
+    /// The first own subdomain of a cluster whose members nothing holds together.
+    pub fn update_clusters(&mut self, timer: &Timer) -> Result<(), usize> {
+        let Some(hybrid) = &mut self.hybrid else { return Ok(()) };
+        timer.time("clusters", || hybrid.update(&mut self.factors))
+    }
+
+    /// Makes factors again from what they were made of, to the same bits, in at least this precision.
+    ///
+    /// # Errors
+    /// The first tangent that is singular. Those behind it have no factors.
+    pub fn remake(
+        &mut self,
+        regions: &[Region],
+        (precision, bases): (Precision, Vec<Bases>),
+        interiors: Option<&mut Schur>,
+        timer: &Timer,
+    ) -> Result<(), NotDefinite> {
+        self.factors.set_precision(precision);
+        let mut on = Factorising { factors: &mut self.factors, schur: interiors, timer };
+        self.tangents.remake(regions, bases, &mut on)
+    }
+
+    /// For some weak subdomain on any rank ([`Schur::is_weak`]): gives the preconditioner the `interiors` of own subdomains
+    /// `beside` weak ones as they are now, and pins what supports hold of weak own ones. Without clusters only, where members hold
+    /// each other. With `is_any_weak` false nothing is pinned any more.
+    ///
+    /// # Errors
+    /// The first block that is singular.
+    pub fn strengthen(
+        &mut self,
+        subdomains: &[Subdomain],
+        beside: &[usize],
+        is_any_weak: bool,
+        interiors: &mut Schur,
+        timer: &Timer,
+    ) -> Result<(), NotDefinite> {
+        self.pins = is_any_weak && self.hybrid.is_none();
+        let pinned: Vec<bool> = (0..subdomains.len()).map(|own| self.pins && interiors.is_weak(own)).collect();
+        let mut on = Factorising { factors: &mut self.factors, schur: Some(interiors), timer };
+        for &own in beside {
+            self.tangents.follow(own, subdomains[own].id, &mut on)?;
+        }
+        for (own, subdomain) in subdomains.iter().enumerate() {
+            let unknowns = if pinned[own] { &self.pinnable[own][..] } else { &[] };
+            self.tangents.pin(own, subdomain, unknowns, &mut on)?;
+        }
+        Ok(())
+    }
+
+    /// Another solve follows, from what is committed now.
+    pub fn begin(&mut self) {
+        self.tangents.commit();
+    }
+
+    /// The next update makes all factors anew.
+    pub fn forget(&mut self) {
+        self.tangents.drop_factors();
+    }
+
+    /// From now on factorises in double precision, and the next update makes all factors anew; false if that was so before.
+    pub fn sharpen(&mut self) -> bool {
+        let before = self.factors.precision();
+        self.factors.set_precision(Precision::Double);
+        self.tangents.drop_factors();
+        before == Precision::Single
+    }
+
+    /// `x = K^+ x`, of clusters if there are any.
+    pub fn solve(&mut self, x: &mut Torn) {
+        match &mut self.hybrid {
+            Some(hybrid) => hybrid.solve(&mut self.factors, x),
+            None => self.factors.solve(x),
+        }
+    }
+
+    /// `x = K^+ x` of each subdomain by itself.
+    pub fn solve_each(&mut self, x: &mut Torn) {
+        self.factors.solve(x);
+    }
+
+    /// Refines `x = K^+ r` of each subdomain by itself, see [`refine::refine`].
+    pub fn refine(&mut self, norm: &dyn Fn(&Torn) -> f64, at: (&Torn, &mut Torn), share: f64) -> (f64, usize) {
+        refine::refine(&mut self.factors, self.tangents.values(), norm, at, share)
+    }
+
+    /// Closes the bonds of clusters in a displacement, see [`Hybrid::rejoin`].
+    pub fn rejoin(&mut self, u: &mut Torn) {
+        self.hybrid.iter_mut().for_each(|hybrid| hybrid.rejoin(u));
+    }
+
+    /// Adds the forces by which the members of clusters held each other in the last [`Inverse::solve`] or [`Inverse::rejoin`].
+    pub fn add_bond_forces(&self, torn: &mut Torn) {
+        self.hybrid.iter().for_each(|hybrid| hybrid.add_forces(torn));
+    }
+
+    /// Whether there are clusters of several subdomains.
+    pub fn is_hybrid(&self) -> bool {
+        self.hybrid.is_some()
+    }
+
+    /// Whether unknowns of any subdomain, on any rank, may be kept at zero now.
+    pub fn pins(&self) -> bool {
+        self.pins
+    }
+
+    /// Unknowns of an own subdomain that its factor keeps at zero, ascending.
+    pub fn pinned(&self, own: usize) -> &[u32] {
+        self.factors.pinned(own)
+    }
+
+    /// Analysis and lower values of an own subdomain's tangent as it was factorised last.
+    pub fn stiffness(&self, own: usize) -> (&Symbolic, &[f64]) {
+        (self.factors.symbolic(own), &self.tangents.values()[own])
+    }
+
+    /// What new factors are stored in at least.
+    pub fn precision(&self) -> Precision {
+        self.factors.precision()
+    }
+
+    /// What the factors of each own subdomain are of.
+    pub fn bases(&self) -> &[Bases] {
+        self.tangents.bases()
+    }
+
+    /// Bytes of factors that one [`Inverse::solve`] reads.
+    pub fn bytes_per_solve(&self) -> f64 {
+        self.factors.bytes_per_solve()
+    }
+}

@@ -12,9 +12,9 @@ use crate::feti::Torn;
 /// Turns of refinement at most: each gains as many digits as the factors have.
 const TURNS: usize = 3;
 
-/// Refines `x = K^+ r`, for `r` in balance, until `|r - K x|` is below a share of `|r|`, or does not fall any more; `tangents` are
-/// the lower values of `K`, which the factors are about of. Returns what share it is in the end, and the number of applications
-/// of `K^+`. Collective, as `norm` is.
+/// Refines `x = K^+ r` until `|r - K x|` is below a `share` of `|r|`, or does not fall any more. `r` is in balance; `tangents` are
+/// the lower values of `K`, from which the factors differ by rounding or a small change. Returns `|r - K x| / |r|` in the end, and
+/// the number of applications of `K^+`. Collective, as `norm` is.
 pub fn refine(
     factors: &mut Factors,
     tangents: &[Rc<Vec<f64>>],
@@ -42,13 +42,13 @@ pub fn refine(
     (left, TURNS)
 }
 
-/// `r - K x`; supports take what is left at unknowns that they hold still.
+/// `r - K x`, zero at unknowns that are kept at zero: their supports carry what is left there.
 fn remainder(factors: &Factors, tangents: &[Rc<Vec<f64>>], r: &Torn, x: &Torn) -> Torn {
     let of = |(own, x): (usize, &Vec<f64>)| {
         let mut product = vec![0.0; x.len()];
         factors.symbolic(own).pattern.multiply_add(&tangents[own], x, &mut product);
         let mut rest: Vec<f64> = r[own].iter().zip(product).map(|(r, kx)| r - kx).collect();
-        factors.held(own).iter().for_each(|&dof| rest[dof as usize] = 0.0);
+        factors.pinned(own).iter().for_each(|&dof| rest[dof as usize] = 0.0);
         rest
     };
     x.iter().enumerate().map(of).collect()

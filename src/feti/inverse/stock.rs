@@ -1,4 +1,4 @@
-//! What own subdomains have each, or several in common: numeric factors.
+//! Numeric factors of own subdomains: each its own, or one for several that are alike.
 //!
 //! Subdomains that are congruent and alike have equal factors. One copy is kept, and they are worked on together, up to
 //! [`WIDTH`] at a time, so that the copy is read once for all of them.
@@ -20,10 +20,10 @@ pub struct Stock<T> {
 /// Own subdomains that are worked on together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Batch {
-    /// One with an item of its own.
+    /// One subdomain with an item of its own.
     Alone(usize),
-    /// Up to [`WIDTH`] with one item. One alone, too, if its twins are on other ranks: what is done with it must not
-    /// depend on that.
+    /// Up to [`WIDTH`] subdomains with one item. A single one, too, if its twins are on other ranks: results must not depend on
+    /// which rank has which subdomain.
     Twins(Vec<usize>),
 }
 
@@ -40,7 +40,8 @@ impl<T> Stock<T> {
         &self.items[own]
     }
 
-    /// The item of an own subdomain, to be overwritten. `common` says that it is to be worked with as one of twins.
+    /// The item of an own subdomain, to be overwritten. `common` says that it has twins, here or on other ranks: it
+    /// is worked on in a batch of twins.
     pub fn renew(&mut self, own: usize, common: bool, fresh: impl FnOnce() -> T) -> &mut T {
         if Rc::get_mut(&mut self.items[own]).is_none() {
             self.items[own] = Rc::new(fresh());
@@ -62,7 +63,7 @@ impl<T> Stock<T> {
         self.batches.get_or_init(|| self.sort())
     }
 
-    /// Sum over all batches of what is told of their items.
+    /// Sum over all batches of a number of their items.
     pub fn sum(&self, of: impl Fn(&T) -> f64) -> f64 {
         let first = |batch: &Batch| match batch {
             Batch::Alone(own) => *own,

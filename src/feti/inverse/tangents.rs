@@ -1,4 +1,4 @@
-//! The tangents of own subdomains: which factors they need, and which of these are kept, shared or made again.
+//! The tangents of own subdomains: which of their factors are kept, shared or made again.
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -21,8 +21,8 @@ const DRIFT: f64 = 0.1;
 /// change. (That of slender elastic subdomains is as small, which costs them nothing: they do not change.)
 const SOFT: f64 = 1e-3;
 
-/// What is factorised.
-pub struct Factorising<'s> {
+/// What is factorised at a tangent.
+pub(super) struct Factorising<'s> {
     /// Factors of whole tangents.
     pub factors: &'s mut Factors,
     /// Factors of their interior blocks, for the preconditioner.
@@ -31,13 +31,26 @@ pub struct Factorising<'s> {
     pub timer: &'s Timer,
 }
 
-/// Tangents as they were factorised.
-pub struct Tangents {
+/// A Newton iterate `u_k`, by what its tangent depends on.
+#[derive(Clone, Copy)]
+pub struct Iterate<'s> {
+    /// Own subdomains, each with its material and history.
+    pub regions: &'s [Region<'s>],
+    /// Torn displacement.
+    pub u: &'s Torn,
+    /// Number of elements of each own subdomain that yield.
+    pub yielding: &'s [usize],
+    /// Directions of flow in each own subdomain ([`crate::assembly::flow`]).
+    pub flows: &'s [Flow],
+}
+
+/// The tangents of own subdomains as they were factorised last.
+pub(super) struct Tangents {
     /// Congruent subdomains have the same number.
     twins: Vec<Option<usize>>,
     /// Lower values of each own subdomain's tangent.
     values: Vec<Rc<Vec<f64>>>,
-    /// What its factors are of.
+    /// The states whose tangents its factors are of.
     bases: Vec<Bases>,
     /// Scratch: a tangent that may be worth factorising.
     assembled: Vec<f64>,
@@ -55,7 +68,7 @@ impl Tangents {
         &self.values
     }
 
-    /// What the factors of each own subdomain are of.
+    /// The states whose tangents the factors of each own subdomain are of.
     pub fn bases(&self) -> &[Bases] {
         &self.bases
     }
@@ -117,64 +130,78 @@ impl Tangents {
         self.take_interior(own, subdomain.id, &values, basis.clone(), common, on)
     }
 
-    /// Assembles the tangents at `u`, where so many elements of each own subdomain are `yielding`, with its directions of `flows`, and factorises those that changed by more than `left`.
-    /// Returns for each own subdomain how many were (1 or 0; shared ones count), and the first that is singular; those
-    /// behind it have not been looked at then. Local.
+    /// Assembles the tangents at an iterate and factorises those that changed by more than `left`, relative to their diagonal.
+    /// Returns for each own subdomain whether it has a new factor; shared ones count.
+    ///
+    /// # Errors
+    /// The first tangent that is singular; those behind it are not looked at.
     pub fn update(
         &mut self,
-        regions: &[Region],
-        (u, yielding, flows): (&Torn, &[usize], &[Flow]),
+        &Iterate { regions, u, yielding, flows }: &Iterate,
         left: f64,
         on: &mut Factorising,
-    ) -> (Vec<f64>, Option<NotDefinite>) {
-        let mut failure: Option<NotDefinite> = None;
-        let mut factorised = Vec::with_capacity(u.len());
+    ) -> Result<Vec<bool>, NotDefinite> {
+        let mut fresh = vec![false; regions.len()];
         for (own, region) in regions.iter().enumerate() {
-            let subdomain = region.subdomain;
-            // An elastic tangent that was elastic before is the same matrix.
-            let unchanged = self.bases[own].is_elastic() && yielding[own] == 0;
-            if unchanged || failure.is_some() {
-                factorised.push(0.0);
-                continue;
-            }
             let elastic = yielding[own] == 0;
-            if elastic && let Some(outcome) = self.adopt(own, subdomain.id, on) {
-                factorised.push(1.0);
-                failure = outcome.err();
+            // An elastic tangent that was elastic before is the same matrix.
+            if elastic && self.bases[own].is_elastic() {
                 continue;
             }
-            let pattern = &on.factors.symbolic(own).pattern;
-            self.assembled.resize(pattern.rows.len(), 0.0);
-            let (assembled, at) = (&mut self.assembled, (&u[own][..], &flows[own][..]));
-            on.timer.time("assembly", || stiffness::assemble(region, at, pattern, assembled));
-            let known = self.bases[own].factor.is_some();
-            let change = if known { pattern.difference(&self.values[own], assembled) } else { f64::INFINITY };
+            // Elastic twins share one factor.
+            if elastic && let Some(outcome) = self.adopt(own, region.subdomain.id, on) {
+                outcome?;
+                fresh[own] = true;
+                continue;
+            }
+            let change = self.assemble(own, region, (&u[own], &flows[own]), on);
             // Where twins are elastic on other ranks only, it gets what it would get from one of them here.
             let common = elastic && self.twins[own].is_some();
             if change <= left && !common {
-                factorised.push(0.0);
                 continue;
             }
-            factorised.push(1.0);
-            let basis =
-                if elastic { Basis::Elastic } else { Basis::At(Arc::new(u[own].clone()), Flow::clone(&flows[own])) };
+            fresh[own] = true;
+            let at = || Basis::At(Arc::new(u[own].clone()), Flow::clone(&flows[own]));
+            let basis = if elastic { Basis::Elastic } else { at() };
             self.bases[own].drift += change;
-            self.bases[own].factor = Some(basis.clone());
-            let values = Rc::new(assembled.clone());
-            self.values[own] = Rc::clone(&values);
-            let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common));
-            on.timer.count("factorisation", on.factors.symbolic(own).analysis().flops(), 0.0);
-            // Of what has become soft little shows in the entries, which may be those of the volume.
-            let drift = self.bases[own].drift;
-            let is_stale = || drift.is_nan() || drift > DRIFT || on.factors.least_pivot(own, &values) < SOFT;
-            failure = match outcome {
-                Ok(()) if common || is_stale() => {
-                    self.take_interior(own, subdomain.id, &values, basis, common, on).err()
-                }
-                outcome => outcome.err(),
-            };
+            self.factorise(own, region.subdomain, basis, common, on)?;
         }
-        (factorised, failure)
+        Ok(fresh)
+    }
+
+    /// Assembles the tangent of an own subdomain into the scratch. Returns by how much it differs from the one that was
+    /// factorised last, relative to its diagonal; infinity if there is none.
+    fn assemble(&mut self, own: usize, region: &Region, at: (&[f64], &Flow), on: &mut Factorising) -> f64 {
+        let pattern = &on.factors.symbolic(own).pattern;
+        self.assembled.resize(pattern.rows.len(), 0.0);
+        let (assembled, at) = (&mut self.assembled, (at.0, &at.1[..]));
+        on.timer.time("assembly", || stiffness::assemble(region, at, pattern, assembled));
+        let known = self.bases[own].factor.is_some();
+        if known { pattern.difference(&self.values[own], assembled) } else { f64::INFINITY }
+    }
+
+    /// Factorises the tangent in the scratch, and the interior block of the preconditioner where that has drifted too far.
+    fn factorise(
+        &mut self,
+        own: usize,
+        subdomain: &Subdomain,
+        basis: Basis,
+        common: bool,
+        on: &mut Factorising,
+    ) -> Result<(), NotDefinite> {
+        self.bases[own].factor = Some(basis.clone());
+        let values = Rc::new(self.assembled.clone());
+        self.values[own] = Rc::clone(&values);
+        let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common));
+        on.timer.count("factorisation", on.factors.symbolic(own).analysis().flops(), 0.0);
+        outcome?;
+        // Where a body has become soft but for its volume, the entries of the volume hide it; the pivots do not.
+        let drift = self.bases[own].drift;
+        let is_stale = || drift.is_nan() || drift > DRIFT || on.factors.least_pivot(own, &values) < SOFT;
+        if common || is_stale() {
+            return self.take_interior(own, subdomain.id, &values, basis, common, on);
+        }
+        Ok(())
     }
 
     /// Gives the preconditioner the interior block of an own subdomain's tangent as it was factorised last, however little that
@@ -190,25 +217,25 @@ impl Tangents {
         self.take_interior(own, id, &values, basis, common, on)
     }
 
-    /// Keeps unknowns of an own subdomain at zero from now on, none if `held` is empty, in the factor of its tangent as it was
-    /// factorised last. Local.
+    /// From now on the factor of an own subdomain keeps these unknowns at zero, none if there are none. It is of the tangent
+    /// that was factorised last.
     ///
     /// # Errors
     /// If it is singular.
-    pub fn hold(
+    pub fn pin(
         &mut self,
         own: usize,
         subdomain: &Subdomain,
-        held: &[u32],
+        pinned: &[u32],
         on: &mut Factorising,
     ) -> Result<(), NotDefinite> {
-        if on.factors.held(own) == held {
+        if on.factors.pinned(own) == pinned {
             return Ok(());
         }
         let values = &self.values[own];
-        on.timer.time("factorisation", || match held {
+        on.timer.time("factorisation", || match pinned {
             [] => on.factors.factorise(own, subdomain, values, false),
-            held => on.factors.hold(own, subdomain, values, held),
+            pinned => on.factors.pin(own, subdomain, values, pinned),
         })
     }
 

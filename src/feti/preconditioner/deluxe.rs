@@ -29,7 +29,7 @@ pub struct Deluxe<'a> {
     comm: &'a dyn Comm,
     faces: Vec<Face>,
     analyses: Vec<Analysed>,
-    /// Whether any rank's faces are scaled so.
+    /// Whether any rank has a face with deluxe scaling.
     active: bool,
 }
 
@@ -68,7 +68,7 @@ struct OwnSide {
 }
 
 impl<'a> Deluxe<'a> {
-    /// No face is scaled so before [`Deluxe::update`].
+    /// Finds the faces. None has deluxe scaling before [`Deluxe::update`].
     pub fn new(comm: &'a dyn Comm, shares: &Shares, constraints: &Constraints, gather: &Gather, schur: &Schur) -> Self {
         // How many rows touch a component of a node.
         let mut touching: HashMap<(u64, usize), usize> = HashMap::new();
@@ -109,8 +109,9 @@ impl<'a> Deluxe<'a> {
         self.faces.iter().filter(is_scaled).any(|face| face.sides.iter().any(is_own))
     }
 
-    /// Faces beside `weak` subdomains are scaled so from now on, with the stiffness of both; that of `fresh` ones has changed. Both
-    /// are of all subdomains; `stiffness` tells analyses and lower values of own ones. Collective.
+    /// From now on faces beside `weak` subdomains have deluxe scaling, the others not. The stiffness of a side is taken again if its
+    /// subdomain is `fresh`: has a new tangent. Both lists are of all subdomains; `stiffness` gives analysis and lower values of
+    /// an own one. Collective.
     pub fn update<'s>(
         &mut self,
         weak: &[bool],
@@ -154,13 +155,12 @@ impl<'a> Deluxe<'a> {
         }
     }
 
-    /// Whether any rank's faces are scaled so.
+    /// Whether any rank has a face with deluxe scaling.
     pub fn is_active(&self) -> bool {
         self.active
     }
 
-    /// `B_D' x` on the faces that are scaled so, in place of what stands there in `displacements` on the boundaries of all own
-    /// subdomains. Local.
+    /// Overwrites `displacements` of own boundaries by `B_D' x` on faces with deluxe scaling. Local.
     pub fn share(&self, x: &[f64], displacements: &mut [Vec<f64>]) {
         for (face, share) in self.scaled() {
             let jumps: Vec<f64> = face.rows.iter().zip(&face.values).map(|(&row, v)| x[row as usize] / v).collect();
@@ -173,7 +173,8 @@ impl<'a> Deluxe<'a> {
         }
     }
 
-    /// The transposed: takes `forces` of own boundaries out on these faces; `B` times `parts` is `B_D` times what was there. Local.
+    /// The transpose of [`Deluxe::share`]. Moves the `forces` of own boundaries on these faces into `parts`, such that `B parts` is
+    /// `B_D` of these forces; leaves zeros. Local.
     pub fn collect(&self, forces: &mut [Vec<f64>], parts: &mut Torn) {
         parts.iter_mut().for_each(|part| part.fill(0.0));
         for (face, share) in self.scaled() {

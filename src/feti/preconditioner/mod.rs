@@ -9,17 +9,23 @@ use self::deluxe::Deluxe;
 use self::scaling::Scaling;
 use super::Torn;
 use super::dual::gather::Gather;
+use super::dual::operator::{Changes, DualOperator, Singular};
+use super::dual::space::RowSpace;
 use super::inverse::schur::Schur;
+use crate::comm::{Comm, Shares};
+use crate::constraint::Constraints;
+use crate::decomposition::Subdomain;
+use crate::monitor::timing::Timer;
 
-/// Approximate inverse of `F`; counts its applications.
+/// Approximate inverse of `F`.
 pub struct Preconditioner<'a> {
     gather: &'a Gather<'a>,
-    /// `S`; updated by the caller before the first application, and when tangents change.
-    pub schur: Schur,
-    /// Scaling of the rows; set by the caller before the first application, and when tangents or rows change.
-    pub scaling: Scaling,
-    /// Scaling of faces beside weak subdomains; updated by the caller when tangents change.
-    pub deluxe: Deluxe<'a>,
+    /// `S`.
+    schur: Schur,
+    /// Scaling of the rows.
+    scaling: Scaling,
+    /// Scaling of faces beside weak subdomains.
+    deluxe: Deluxe<'a>,
     /// Place among the boundary unknowns of each own subdomain's coefficients, in the order of the rows.
     places: Vec<Vec<u32>>,
     displacements: Vec<Vec<f64>>,
@@ -28,12 +34,19 @@ pub struct Preconditioner<'a> {
     /// What faces with a scaling of their own make of forces.
     parts: Torn,
     rows: Vec<f64>,
-    applications: usize,
 }
 
 impl<'a> Preconditioner<'a> {
-    /// With the boundary stiffness on the [`boundaries`] of the same `gather`.
-    pub fn new(gather: &'a Gather<'a>, schur: Schur, deluxe: Deluxe<'a>) -> Self {
+    /// With the boundary stiffness on the [`Gather::boundaries`] of the same `gather`. It gets its numbers by
+    /// [`Preconditioner::interiors`] and [`Preconditioner::update`].
+    pub fn new(
+        comm: &'a dyn Comm,
+        shares: &Shares,
+        constraints: &Constraints,
+        gather: &'a Gather<'a>,
+        schur: Schur,
+    ) -> Self {
+        let deluxe = Deluxe::new(comm, shares, constraints, gather, &schur);
         let torn = gather.zeros();
         let place = |own: usize, dof| schur.boundary(own).binary_search(&dof).expect("rows touch boundary unknowns");
         let places = (0..torn.len())
@@ -51,13 +64,50 @@ impl<'a> Preconditioner<'a> {
             parts: torn.clone(),
             torn,
             rows: vec![0.0; gather.rows()],
-            applications: 0,
         }
+    }
+
+    /// `S`, of which [`DualOperator::update`] makes the interior factors along with those of the tangents.
+    pub fn interiors(&mut self) -> &mut Schur {
+        &mut self.schur
+    }
+
+    /// Follows the tangents of the operator after these changes: scales all rows by their stiffness, and faces beside weak
+    /// subdomains by that of both sides; these subdomains are strengthened ([`DualOperator::strengthen`]). Collective.
+    ///
+    /// # Errors
+    /// If a block is singular.
+    pub fn update(
+        &mut self,
+        operator: &mut DualOperator,
+        changes: &Changes,
+        subdomains: &[Subdomain],
+        constraints: &Constraints,
+        space: &RowSpace,
+        timer: &Timer,
+    ) -> Result<(), Singular> {
+        let Changes { fresh, weak } = changes;
+        let stiffness = (0..subdomains.len()).map(|own| operator.inverse().stiffness(own));
+        let stiffness = stiffness.map(|(symbolic, values)| (&symbolic.pattern, values));
+        self.scaling = timer.time("scaling", || Scaling::new(constraints, self.gather, stiffness));
+        let is_any_weak = weak.contains(&true);
+        if !is_any_weak && !self.deluxe.is_active() {
+            return Ok(());
+        }
+        let beside: Vec<usize> = (0..subdomains.len()).filter(|&own| self.deluxe.is_beside(own, weak)).collect();
+        operator.strengthen(subdomains, (&beside, is_any_weak), &mut self.schur, space, timer)?;
+        let stiffness = |own: usize| operator.inverse().stiffness(own);
+        timer.time("faces", || self.deluxe.update(weak, fresh, &self.schur, stiffness));
+        Ok(())
+    }
+
+    /// From now on scales the kept rows only: all equalities and some inequalities. Local.
+    pub fn restrict(&mut self, constraints: &Constraints, kept: impl Fn(usize) -> bool) {
+        self.scaling.restrict(constraints, kept);
     }
 
     /// `y = B_D S B_D' x`. One neighbour exchange, or two where faces have a scaling of their own.
     pub fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        self.applications += 1;
         self.displace(x);
         self.schur.apply(&self.displacements, &mut self.forces);
         if self.deluxe.is_active() {
@@ -65,7 +115,7 @@ impl<'a> Preconditioner<'a> {
         }
         for (own, torn) in self.torn.iter_mut().enumerate() {
             let (boundary, forces) = (self.schur.boundary(own), &mut self.forces[own]);
-            self.scaling.flexibility.apply(own, boundary, forces);
+            self.scaling.flexibility().apply(own, boundary, forces);
             // Only boundary unknowns are read.
             boundary.iter().zip(forces).for_each(|(&dof, x)| torn[dof as usize] = *x);
         }
@@ -75,6 +125,17 @@ impl<'a> Preconditioner<'a> {
             self.gather.apply(&self.parts, &mut self.rows);
             y.iter_mut().zip(&self.rows).for_each(|(y, part)| *y += part);
         }
+    }
+
+    /// Closes what a displacement leaves open of the `slack`, in the kept rows and in violated ones, at the least energy that the
+    /// preconditioner knows. One neighbour exchange.
+    pub fn close(&mut self, constraints: &Constraints, slack: &[f64], kept: &[bool], u: &mut Torn, timer: &Timer) {
+        let mut defect = vec![0.0; slack.len()];
+        self.gather.apply(u, &mut defect);
+        defect.iter_mut().zip(slack).for_each(|(d, s)| *d = s - *d);
+        constraints.laws().violation(&mut defect);
+        timer.time("scaling", || self.restrict(constraints, |row| kept[row] || defect[row] != 0.0));
+        timer.time("preconditioner", || self.mend(&defect, u));
     }
 
     /// Adds to a torn displacement what closes the rows' `defect = c - B u`: `B_D' defect` on the boundary and, for
@@ -92,14 +153,14 @@ impl<'a> Preconditioner<'a> {
             for (entry, &place) in self.gather.entries(own).iter().zip(&self.places[own]) {
                 t[place as usize] += entry.value * self.rows[entry.row as usize];
             }
-            self.scaling.flexibility.apply(own, self.schur.boundary(own), t);
+            self.scaling.flexibility().apply(own, self.schur.boundary(own), t);
         }
         self.deluxe.share(x, &mut self.displacements);
     }
 
-    /// Applications so far.
-    pub fn applications(&self) -> usize {
-        self.applications
+    /// Bytes of matrices that one application reads.
+    pub fn bytes_per_apply(&self) -> f64 {
+        self.schur.bytes_per_apply()
     }
 }
 

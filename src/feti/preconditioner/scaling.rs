@@ -19,7 +19,7 @@ const SMALL: usize = 64;
 #[derive(Default)]
 pub struct Scaling {
     /// `D^-1`.
-    pub flexibility: Flexibility,
+    flexibility: Flexibility,
     /// Rows of the small blocks.
     blocks: Vec<Range<usize>>,
     /// Inverses of the small blocks, row by row, one behind the other.
@@ -70,6 +70,11 @@ impl Scaling {
                 gram.factorise(|a, b| self.flexibility.between(a, b), &kept);
             }
         }
+    }
+
+    /// `D^-1`.
+    pub fn flexibility(&self) -> &Flexibility {
+        &self.flexibility
     }
 
     /// `y = (B D^-1 B')^-1 x`. Local.

@@ -2,7 +2,6 @@ use faer::prelude::Solve;
 use faer::{Mat, Side};
 
 use super::Preconditioner;
-use super::deluxe::Deluxe;
 use super::scaling::Scaling;
 use crate::constraint::Kind;
 use crate::decomposition::Subdomain;
@@ -43,8 +42,8 @@ impl<'a> Case<'a> {
             schur.update(k, k, values, false).expect("the interior is held by its boundary");
         }
         let Discrete { constraints, decomposition, .. } = &setup.discrete;
-        let deluxe = Deluxe::new(setup.comm, &decomposition.shares, constraints, &setup.gather, &schur);
-        let mut preconditioner = Preconditioner::new(&setup.gather, schur, deluxe);
+        let shares = &decomposition.shares;
+        let mut preconditioner = Preconditioner::new(setup.comm, shares, constraints, &setup.gather, schur);
         let stiffness = stiffnesses.iter().enumerate().map(|(k, values)| (&factors.symbolic(k).pattern, &values[..]));
         preconditioner.scaling = Scaling::new(&setup.discrete.constraints, &setup.gather, stiffness);
         preconditioner.scaling.restrict(&setup.discrete.constraints, kept);
@@ -244,7 +243,7 @@ fn scaled_rows_are_dual_to_the_rows() {
             setup.gather.add_transpose(1.0, &solved, &mut torn);
             for ((own, t), boundary) in torn.iter_mut().enumerate().zip(setup.gather.boundaries()) {
                 let mut on_boundary: Vec<f64> = boundary.iter().map(|&dof| t[dof as usize]).collect();
-                scaling.flexibility.apply(own, &boundary, &mut on_boundary);
+                scaling.flexibility().apply(own, &boundary, &mut on_boundary);
                 boundary.iter().zip(on_boundary).for_each(|(&dof, x)| t[dof as usize] = x);
             }
             let mut back = vec![0.0; x.len()];

@@ -7,8 +7,8 @@ use super::{Factors, analyse};
 use crate::assembly::{Region, stiffness};
 use crate::constraint::Kind;
 use crate::decomposition::Subdomain;
-use crate::feti::dual::supported;
 use crate::feti::inverse::kernel::RigidModes;
+use crate::feti::inverse::pinnable;
 use crate::fixture::{assert_close, built_in, column, dense, elastic, on_ranks, two_bricks, two_bricks_by_metis};
 use crate::material::samples::MATERIAL;
 use crate::random::Random;
@@ -168,22 +168,22 @@ fn twins_get_what_they_would_get_alone_and_the_same_bits_beside_any_others() {
 }
 
 #[test]
-fn held_unknowns_stay_and_the_others_give_way_as_without_them() {
+fn pinned_unknowns_stay_and_the_others_give_way_as_without_them() {
     on_ranks(&two_bricks_by_metis(7), 1, |setup| {
         let (mut factors, stiffnesses) = setup.factors();
-        let held = supported::unknowns(&setup.discrete.constraints, &setup.gather, setup.subdomains(), &setup.modes);
+        let pinned = pinnable::unknowns(&setup.discrete.constraints, setup.subdomains(), &setup.modes);
         let mut forces = setup.displacements(3);
         let before = forces.clone();
-        let own = (0..held.len()).find(|&own| !held[own].is_empty()).expect("a support holds a part");
-        factors.hold(own, &setup.subdomains()[own], &stiffnesses[own], &held[own]).expect("nothing is free");
-        assert_eq!(factors.held(own), held[own]);
+        let own = (0..pinned.len()).find(|&own| !pinned[own].is_empty()).expect("a support holds a part");
+        factors.pin(own, &setup.subdomains()[own], &stiffnesses[own], &pinned[own]).expect("nothing is free");
+        assert_eq!(factors.pinned(own), pinned[own]);
         factors.solve(&mut forces);
         let k = dense(&factors.symbolic(own).pattern, &stiffnesses[own]);
-        let rest: Vec<usize> = (0..k.nrows()).filter(|&dof| !held[own].contains(&(dof as u32))).collect();
+        let rest: Vec<usize> = (0..k.nrows()).filter(|&dof| !pinned[own].contains(&(dof as u32))).collect();
         let part = Mat::from_fn(rest.len(), rest.len(), |i, j| k[(rest[i], rest[j])]);
         let moved = part.partial_piv_lu().solve(Mat::from_fn(rest.len(), 1, |i, _| before[own][rest[i]]));
         assert_close(&Mat::from_fn(rest.len(), 1, |i, _| forces[own][rest[i]]), &moved, 1e-10);
-        assert!(held[own].iter().all(|&dof| forces[own][dof as usize] == 0.0));
+        assert!(pinned[own].iter().all(|&dof| forces[own][dof as usize] == 0.0));
 
         factors.factorise(own, &setup.subdomains()[own], &stiffnesses[own], false).expect("elastic bodies are stiff");
         let mut again = before.clone();
@@ -194,17 +194,16 @@ fn held_unknowns_stay_and_the_others_give_way_as_without_them() {
     });
 }
 
-/// Parts are held where what is left of the stiffness without the supports' unknowns is as definite as it gets.
+/// Parts are pinned where what is left of the stiffness without the supports' unknowns is as definite as it gets.
 #[test]
 fn supports_hold_the_parts_to_which_they_leave_no_rigid_motion() {
     let sliding = two_bricks(&["support.left.fix=['x']", "support.right.fix=['x', 'y']"]);
-    for (scene, held_at_all) in [(two_bricks(&[]), true), (two_bricks_by_metis(7), true), (sliding, false)] {
+    for (scene, pinned_at_all) in [(two_bricks(&[]), true), (two_bricks_by_metis(7), true), (sliding, false)] {
         on_ranks(&scene, 1, |setup| {
             let (factors, stiffnesses) = setup.factors();
-            let held =
-                supported::unknowns(&setup.discrete.constraints, &setup.gather, setup.subdomains(), &setup.modes);
-            assert_eq!(held.iter().any(|held| !held.is_empty()), held_at_all);
-            for (own, held) in held.iter().enumerate() {
+            let pinned = pinnable::unknowns(&setup.discrete.constraints, setup.subdomains(), &setup.modes);
+            assert_eq!(pinned.iter().any(|pinned| !pinned.is_empty()), pinned_at_all);
+            for (own, pinned) in pinned.iter().enumerate() {
                 let is_support = |row: u32| matches!(setup.rows()[row as usize].kind, Kind::Support { .. });
                 let mut supported: Vec<u32> =
                     setup.gather.entries(own).iter().filter(|e| is_support(e.row)).map(|e| e.dof).collect();
@@ -214,8 +213,8 @@ fn supports_hold_the_parts_to_which_they_leave_no_rigid_motion() {
                 let part = Mat::from_fn(rest.len(), rest.len(), |i, j| k[(rest[i], rest[j])]);
                 let values = part.self_adjoint_eigenvalues(Side::Lower).expect("they exist");
                 let definite = values[0] > 1e-4 * values[values.len() - 1];
-                assert_eq!(!held.is_empty(), definite && !supported.is_empty(), "subdomain {own}: {:e}", values[0]);
-                assert!(held.is_empty() || *held == supported);
+                assert_eq!(!pinned.is_empty(), definite && !supported.is_empty(), "subdomain {own}: {:e}", values[0]);
+                assert!(pinned.is_empty() || *pinned == supported);
             }
         });
     }

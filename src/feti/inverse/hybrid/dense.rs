@@ -19,13 +19,13 @@ use crate::feti::inverse::kernel::MODES;
 use crate::sparse::simd::vectorised;
 
 /// `W`, `S^-1` and `(G S^-1 G')^-1`, by columns.
-pub struct Inverse {
+pub struct DenseProblem {
     responses: Vec<Rc<Vec<f64>>>,
     rows: Vec<f64>,
     motions: Vec<f64>,
 }
 
-impl Inverse {
+impl DenseProblem {
     /// From `W` of each member, by columns in the order of its jumps; `None` if that has no inverse.
     pub fn new(bonds: &Bonds, responses: Vec<Rc<Vec<f64>>>) -> Option<Self> {
         let (n, m) = (bonds.rows, MODES * bonds.members.len());

@@ -1,32 +1,33 @@
-//! Subdomains that supports hold still ([`crate::feti::dual::supported`]): what the supports move there, and what they carry.
+//! Supports of subdomains whose supported unknowns are pinned ([`crate::feti::inverse::pinnable`]): how far they move, and what
+//! they carry.
+//!
+//! The factor of such a subdomain keeps these unknowns at zero. Prescribed displacements there are a lift `w` that is known, and the
+//! rest is solved for with `f - K w`. The supports carry what equilibrium of the pinned unknowns leaves: `f - B'lambda - K du`.
 
-use std::rc::Rc;
-
-use super::gather::Gather;
 use crate::constraint::{Constraints, Kind};
 use crate::feti::Torn;
-use crate::feti::inverse::factor::Factors;
+use crate::feti::dual::gather::Gather;
+use crate::feti::inverse::Inverse;
 
-/// The tangents of own subdomains, and what is kept at zero in their factors.
-pub struct Held<'s> {
-    /// The factors.
-    pub factors: &'s Factors,
-    /// Lower values of the tangents.
-    pub tangents: &'s [Rc<Vec<f64>>],
-    /// The rows of B.
-    pub constraints: &'s Constraints,
-    /// B.
-    pub gather: &'s Gather<'s>,
+/// Own subdomains with pinned unknowns, and their rows.
+pub struct Pinned<'s> {
+    inverse: &'s Inverse,
+    constraints: &'s Constraints,
+    gather: &'s Gather<'s>,
 }
 
-impl Held<'_> {
-    /// Own subdomains of which unknowns are kept at zero.
-    fn subdomains(&self) -> impl Iterator<Item = usize> {
-        (0..self.tangents.len()).filter(|&own| !self.factors.held(own).is_empty())
+impl<'s> Pinned<'s> {
+    /// Those of an inverse as it was updated last.
+    pub fn new(inverse: &'s Inverse, constraints: &'s Constraints, gather: &'s Gather<'s>) -> Self {
+        Self { inverse, constraints, gather }
     }
 
-    /// A displacement that closes the `slack` of supports in these subdomains and is zero elsewhere; takes its part from the
-    /// forces, and what it closes from the slack of all rows. One neighbour exchange.
+    fn subdomains(&self) -> impl Iterator<Item = usize> {
+        (0..self.constraints.entries.len()).filter(|&own| !self.inverse.pinned(own).is_empty())
+    }
+
+    /// `w`, a displacement that closes the `slack` of supports in these subdomains and is zero elsewhere. Subtracts `K w` from the
+    /// forces and `B w` from the slack. One neighbour exchange.
     pub fn lift(&self, forces: &mut Torn, slack: &mut [f64]) -> Torn {
         let mut lifted = self.gather.zeros();
         for own in self.subdomains() {
@@ -45,15 +46,15 @@ impl Held<'_> {
         lifted
     }
 
-    /// Adds to multipliers what supports carry in these subdomains: what `forces` and the last of the multipliers, which are in
-    /// balance, leave there after the displacement `du`. One neighbour exchange.
+    /// Adds to multipliers what supports carry in these subdomains, `forces - B'lambda - K du` at pinned unknowns with the last of
+    /// the multipliers, which are in balance. One neighbour exchange.
     pub fn add_reactions<const N: usize>(&self, (forces, du): (&Torn, &Torn), multipliers: [&mut Vec<f64>; N]) {
         let mut left = self.gather.zeros();
         for own in self.subdomains() {
             let mut rest = forces[own].clone();
             self.gather.add_transpose_one(own, -1.0, multipliers[N - 1], &mut rest);
             self.subtract_product(own, &du[own], &mut rest);
-            self.factors.held(own).iter().for_each(|&dof| left[own][dof as usize] = rest[dof as usize]);
+            self.inverse.pinned(own).iter().for_each(|&dof| left[own][dof as usize] = rest[dof as usize]);
         }
         let mut carried = vec![0.0; self.gather.rows()];
         self.gather.apply(&left, &mut carried);
@@ -65,6 +66,7 @@ impl Held<'_> {
     /// `y -= K x`.
     fn subtract_product(&self, own: usize, x: &[f64], y: &mut [f64]) {
         let minus: Vec<f64> = x.iter().map(|x| -x).collect();
-        self.factors.symbolic(own).pattern.multiply_add(&self.tangents[own], &minus, y);
+        let (symbolic, values) = self.inverse.stiffness(own);
+        symbolic.pattern.multiply_add(values, &minus, y);
     }
 }
