@@ -147,7 +147,6 @@ fn lumped_and_dirichlet_equal_their_dense_formulas_with_all_rows_and_with_some()
                 let x = setup.multipliers(8);
                 let expected = &scaled * s * scaled.transpose() * column(&x);
                 assert_close(&column(&case.apply(&x)), &expected, 1e-11);
-                assert_eq!(case.preconditioner.applications(), 1);
             }
         });
     }
