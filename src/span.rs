@@ -2,7 +2,7 @@
 //!
 //! By modified Gram-Schmidt: one vector after the other is made a unit vector, and the others orthogonal to it. How small a
 //! remainder counts as nothing is what the callers know: whether supports hold a body is a matter of arms and of its size
-//! ([`crate::scene::held`], [`crate::feti::coarse::bodies`], [`crate::feti::coarse::equilibrium`]). For a few dozen
+//! (`scene::held`, [`crate::feti::coarse::bodies`], [`crate::feti::coarse::equilibrium`]). For a few dozen
 //! vectors; nothing here is blocked.
 
 use crate::vector::{dot, length};

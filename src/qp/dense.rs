@@ -1,7 +1,6 @@
-//! For tests: dense matrices, a projector by Gram-Schmidt, and the truth by trying all active sets.
+//! For tests: dense matrices, a projector by Gram-Schmidt, random numbers, and the truth by trying all active sets.
 
 use super::quadratic::{Joined, Operator, Projection, Space};
-pub use crate::random::Random;
 pub use crate::vector::dot;
 
 /// Plain inner products.
@@ -14,6 +13,27 @@ impl Space for Plain {
 
     fn minimum(&self, mine: f64) -> f64 {
         mine
+    }
+}
+
+/// Linear congruential generator (Knuth, MMIX).
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        let mut random = Self(seed);
+        random.vector(4);
+        random
+    }
+
+    /// Uniform on -1..1.
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    pub fn vector(&mut self, n: usize) -> Vec<f64> {
+        (0..n).map(|_| self.next()).collect()
     }
 }
 
@@ -37,7 +57,7 @@ impl Matrix {
 
     pub fn with_eigenvalues(values: &[f64], random: &mut Random) -> Self {
         let n = values.len();
-        let basis = gram_schmidt((0..n).map(|_| random.numbers(n)).collect());
+        let basis = gram_schmidt((0..n).map(|_| random.vector(n)).collect());
         let entry = |i: usize, j: usize| (0..n).map(|k| values[k] * basis[k][i] * basis[k][j]).sum();
         Self::new(n, (0..n * n).map(|e| entry(e / n, e % n)).collect())
     }

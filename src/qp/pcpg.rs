@@ -208,7 +208,7 @@ mod tests {
         let mut random = Random::new(3);
         let n = 30;
         let mut a = Matrix::with_condition(n, 1e3, &mut random);
-        let (g, h, b) = (random.numbers(n), random.numbers(n), random.numbers(n));
+        let (g, h, b) = (random.vector(n), random.vector(n), random.vector(n));
         let sum = g.iter().zip(&h).map(|(g, h)| g + h).collect();
         let mut null = Null::of(vec![g, h, sum]);
         let mut x = vec![0.0; n];
@@ -223,8 +223,8 @@ mod tests {
         let mut random = Random::new(4);
         let n = 20;
         let mut a = Matrix::with_condition(n, 1e2, &mut random);
-        let mut null = Null::of(vec![random.numbers(n)]);
-        let (b, mut x) = (random.numbers(n), random.numbers(n));
+        let mut null = Null::of(vec![random.vector(n)]);
+        let (b, mut x) = (random.vector(n), random.vector(n));
         let before = dot(&null.rows[0], &x);
         let first = run(&mut a, &mut null, None, &b, &mut x);
         assert!((dot(&null.rows[0], &x) - before).abs() < 1e-12);
@@ -241,8 +241,8 @@ mod tests {
         let mut a = Matrix::with_condition(n, 1e4, &mut random);
         let mut near = Matrix::new(n, a.inverse().entries);
         (0..n).for_each(|i| near.entries[i * n + i] *= 1.1);
-        let mut null = Null::of(vec![random.numbers(n)]);
-        let b = random.numbers(n);
+        let mut null = Null::of(vec![random.vector(n)]);
+        let b = random.vector(n);
         let (mut x, mut y) = (vec![0.0; n], vec![0.0; n]);
         let plain = run(&mut a, &mut null, None, &b, &mut x);
         let fast = run(&mut a, &mut null, Some(&mut near), &b, &mut y);
@@ -255,7 +255,7 @@ mod tests {
         let mut random = Random::new(8);
         let n = 80;
         let mut a = Matrix::with_condition(n, 1e3, &mut random);
-        let (b, mut null) = (random.numbers(n), Null::of(vec![random.numbers(n)]));
+        let (b, mut null) = (random.vector(n), Null::of(vec![random.vector(n)]));
         let mut solver = Pcpg::new(&Plain);
         let (mut x, mut residual, mut products) = (vec![0.0; n], b.clone(), 0);
         for relative in [1e-1, 1e-3, 1e-10] {
@@ -274,7 +274,7 @@ mod tests {
         let mut random = Random::new(6);
         let n = 60;
         let mut a = Matrix::with_condition(n, 1e9, &mut random);
-        let b = random.numbers(n);
+        let b = random.vector(n);
         let mut x = vec![0.0; n];
         let mut residual = b.clone();
         let limits = Limits { relative: 1e-6, ..LIMITS };
@@ -290,7 +290,7 @@ mod tests {
         let mut random = Random::new(7);
         let mut a = Matrix::with_condition(5, 10.0, &mut random);
         a.entries.iter_mut().for_each(|v| *v = -*v);
-        let b = random.numbers(5);
+        let b = random.vector(5);
         assert_eq!(run(&mut a, &mut Null::default(), None, &b, &mut [0.0; 5]).outcome, Outcome::Unbounded);
         a.entries[7] = f64::NAN;
         let (mut x, mut residual) = (vec![0.0; 5], b.clone());

@@ -97,7 +97,7 @@ mod tests {
         for cond in [1e0, 1e2, 1e5] {
             let n = 60;
             let (mut a, norm_exact) = (Matrix::with_condition(n, cond, &mut random), 1.0);
-            let start = random.numbers(n);
+            let start = random.vector(n);
             let found = norm(&Plain, &mut function(&mut a, &mut Null::default()), &start).expect("an estimate");
             assert!(found.norm > 0.9 * norm_exact && found.norm < norm_exact * (1.0 + 1e-10), "{found:?}");
             assert_eq!(found.products, a.products);

@@ -66,7 +66,7 @@ impl Random {
 fn survives(inputs: &[Vec<u8>], body: impl Fn(&[u8])) {
     let stated = std::env::var("FETIPLAST_FUZZ_SECONDS").ok().map(|s| s.parse().expect("it is a number of seconds"));
     let clock = || std::time::UNIX_EPOCH.elapsed().expect("it is after 1970").as_nanos() as u64;
-    let mut random = Random::new(if stated.is_some() { clock() } else { 1 });
+    let mut random = Random(if stated.is_some() { clock() } else { 1 });
     let (started, before) = (Instant::now(), peak_rss_mb().expect("Linux says"));
     let mut tried = 0;
     while stated.map_or(tried < FEW, |seconds| started.elapsed().as_secs() < seconds) {

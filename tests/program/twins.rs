@@ -148,7 +148,7 @@ const UPPER_SLAVE: &str = "slave = \"upper.zmin\"\nmaster = \"lower.zmax\"";
 #[test]
 fn random_scenes_are_what_their_twins_are() {
     let stated = std::env::var("FETIPLAST_FUZZ_SCENES").ok().map(|n| n.parse().expect("it is a number of scenes"));
-    let mut random = Random::new(stated.map_or(1, |n: u64| n));
+    let mut random = Random(stated.map_or(1, |n: u64| n));
     let (mut stood, mut tipped, mut largest) = (0, 0, 0.0_f64);
     for number in 0..stated.unwrap_or(FEW as u64) {
         let scene = Stacked::random(&mut random);

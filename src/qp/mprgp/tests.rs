@@ -65,8 +65,8 @@ fn equals_enumeration() {
     for case in 0..60 {
         let n = 3 + case % 10;
         let mut a = Matrix::with_condition(n, 100.0, &mut random);
-        let b = random.numbers(n);
-        let lower: Vec<f64> = (0..n).map(|i| if i < 7 { 2.0 * random.number() } else { f64::NEG_INFINITY }).collect();
+        let b = random.vector(n);
+        let lower: Vec<f64> = (0..n).map(|i| if i < 7 { 2.0 * random.next() } else { f64::NEG_INFINITY }).collect();
         let exact = enumerate(&a, &b, &lower, &Null::default());
         let set = FeasibleSet::above(lower);
         for expansion in [Expansion::ProjectedCg, Expansion::Fixed] {
@@ -125,7 +125,7 @@ fn unbounded_and_not_finite() {
     let mut random = Random::new(12);
     let mut a = Matrix::with_eigenvalues(&[1.0, 0.0, 0.0], &mut random);
     a.entries.iter_mut().for_each(|v| *v = -*v);
-    let b = random.numbers(3);
+    let b = random.vector(3);
     let free = FeasibleSet::above(vec![f64::NEG_INFINITY; 3]);
     assert_eq!(run(&mut a, None, &b, &free, Expansion::ProjectedCg, 1.0, 1e-9).outcome, Outcome::Unbounded);
     a.entries[4] = f64::NAN;

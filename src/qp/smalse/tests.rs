@@ -22,10 +22,10 @@ impl Case {
     /// Random, `rows` equalities of which one is redundant, every third entry bounded.
     fn random(n: usize, rows: usize, cond: f64, random: &mut Random) -> Self {
         let a = Matrix::with_condition(n, cond, random);
-        let mut g: Vec<_> = (0..rows).map(|_| random.numbers(n)).collect();
+        let mut g: Vec<_> = (0..rows).map(|_| random.vector(n)).collect();
         g.extend(g.first().cloned());
-        let lower = (0..n).map(|i| if i % 3 == 0 { -random.number().abs() } else { NONE }).collect();
-        Self::new(a, Null::of(g), random.numbers(n), lower)
+        let lower = (0..n).map(|i| if i % 3 == 0 { -random.next().abs() } else { NONE }).collect();
+        Self::new(a, Null::of(g), random.vector(n), lower)
     }
 
     fn exact(&self) -> Vec<f64> {
@@ -131,7 +131,7 @@ fn ill_conditioned() {
     let mut random = Random::new(24);
     for cond in [1e8, 1e10] {
         let mut case = Case::random(60, 3, cond, &mut random);
-        case.b = case.a.times(&random.numbers(60));
+        case.b = case.a.times(&random.vector(60));
         case.settings.limits.relative = 1e-6;
         let found = case.solve();
         case.check(&found, 2e-6);
@@ -157,9 +157,9 @@ fn large(random: &mut Random) -> Case {
     let n = a.n;
     let norm = 8.0 * 24.0 * 24.0;
     a.entries.iter_mut().for_each(|v| *v /= norm);
-    let g = (0..8).map(|k| (0..n).map(|i| if i % 8 == k { random.number() } else { 0.0 }).collect()).collect();
+    let g = (0..8).map(|k| (0..n).map(|i| if i % 8 == k { random.next() } else { 0.0 }).collect()).collect();
     let lower = (0..n).map(|i| if i % 4 == 0 { -0.5 } else { NONE }).collect();
-    let b = (0..n).map(|_| 1e-2 * (random.number() - 0.3)).collect();
+    let b = (0..n).map(|_| 1e-2 * (random.next() - 0.3)).collect();
     Case::new(a, Null::of(g), b, lower)
 }
 

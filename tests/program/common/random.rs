@@ -1,17 +1,14 @@
 //! Random numbers, the same at every run.
 
-use fastrand::Rng;
-
-/// A generator; equal seeds give equal sequences.
-pub struct Random(Rng);
+/// Marsaglia's xorshift.
+pub struct Random(pub u64);
 
 impl Random {
-    pub fn new(seed: u64) -> Self {
-        Self(Rng::with_seed(seed))
-    }
-
     /// From zero to below a bound.
     pub fn below(&mut self, bound: usize) -> usize {
-        self.0.usize(..bound)
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 % bound as u64) as usize
     }
 }
