@@ -29,7 +29,7 @@ use crate::comm::agree::root_texts;
 use crate::comm::{Comm, Shares, decide, maximum, ordered_sum};
 use crate::heap::EXIT_MEMORY;
 use crate::model::ModelError;
-use crate::model::bodies::MeshError;
+use crate::model::meshes::MeshError;
 use crate::monitor::stdout;
 use crate::monitor::timing::peak_rss_mb;
 use crate::record::summary::Summary;

@@ -91,7 +91,7 @@ impl Found {
         Ok(Self {
             sizes: sizing::sizes(&discrete, comm),
             memory: sizing::memory(scene, &discrete, comm),
-            contacts: discrete.contact_rows,
+            contacts: discrete.contacts.rows,
             warnings: discrete.warnings,
             reading_mb: discrete.reading_mb,
         })

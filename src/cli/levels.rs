@@ -216,7 +216,7 @@ impl Run<'_> {
         let subdomains = sizes.subdomains;
         let (name, level) = (plan.source.scene.clone(), plan.levels[0]);
         monitor.event(&Event::Sizes { scene: name, level, ranks: self.comm.size(), sizes });
-        discrete.contact_rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
+        discrete.contacts.rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
         discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
         if let [_] = plan.levels[..] {
             let warnings = warnings(scene, &discrete.warnings, subdomains, self.comm);

@@ -101,7 +101,7 @@ fn a_common_motion_leaves_gluing_at_rest_and_is_seen_by_supports_and_contact() {
                         (row.terms.len() as f64).sqrt() * motion(point(setup, row.terms[0].node))[axis]
                     }
                     Kind::Contact { pair } => {
-                        let pair = &setup.discrete.pairs[pair];
+                        let pair = &setup.discrete.contacts.pairs[pair];
                         let part = |node: u64, axis: usize| {
                             let free = row.terms.iter().any(|t| (t.node, t.axis) == (node, axis));
                             if free { pair.normal[axis] * motion(point(setup, node))[axis] } else { 0.0 }
@@ -167,7 +167,7 @@ fn a_pair_fixed_on_both_sides_along_the_normal_has_no_row() {
     for ranks in RANKS {
         on_ranks(&flush, ranks, |setup| {
             let contact = crate::sizing::sizes(&setup.discrete, setup.comm).contact_rows;
-            assert_eq!((setup.discrete.pairs.len(), contact), (15, 12));
+            assert_eq!((setup.discrete.contacts.pairs.len(), contact), (15, 12));
         });
     }
     on_ranks(&flush, 1, |setup| assert_eq!(setup.discrete.constraints.idle.len(), 3));

@@ -8,24 +8,27 @@ use crate::contact::surface::GatheredSurface;
 use crate::contact::{Conditions, ContactError, ContactPair, MasterNode, corner, rigid, sagitta};
 use crate::decomposition::Decomposition;
 use crate::record::counts::ContactRow;
-use crate::scene::{Scene, Sides, SurfaceName};
+use crate::scene::{Contact, Scene, Sides, SurfaceName};
 
-/// What comes of the contacts of a scene.
+/// The contacts of a scene.
 #[derive(Default)]
-pub(super) struct Paired {
+pub struct Contacts {
+    /// Their names.
+    pub names: Vec<String>,
+    /// Indices of the surfaces in contact, contact by contact.
+    pub surfaces: Vec<usize>,
     /// Pairs of all contacts.
     pub pairs: Vec<ContactPair>,
-    /// Nodes of all master surfaces, by the indices of these pairs.
+    /// Nodes of all master surfaces that have slaves opposite, by the indices of these pairs.
     pub masters: Vec<MasterNode>,
     /// Where each of the pairs is.
     pub sites: Vec<Site>,
-    /// A row for each contact.
+    /// How each contact was paired.
     pub rows: Vec<ContactRow>,
-    /// What the user should know.
-    pub warnings: Vec<String>,
 }
 
-/// Pairs all contacts. `index` numbers the surfaces of the decomposition, `extents` are those of the bodies. Collective.
+/// Pairs all contacts; the texts are what the user should know. `index` numbers the surfaces of the decomposition, `extents`
+/// are those of the bodies. Collective.
 ///
 /// # Errors
 /// If a contact has no pairs, or obstacles are too many for a node.
@@ -36,10 +39,15 @@ pub(super) fn pair(
     supports: &[Support],
     extents: &[Extent],
     index: impl Fn(&SurfaceName) -> usize,
-) -> Result<Paired, ContactError> {
+) -> Result<(Contacts, Vec<String>), ContactError> {
     let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
     let held = |nodes: &[u64]| dirichlet::fixed_at(comm, &decomposition.interface, supports, nodes);
-    let mut all = Paired::default();
+    let mut all = Contacts {
+        names: scene.contact.keys().cloned().collect(),
+        surfaces: scene.contact.values().flat_map(Contact::surfaces).map(&index).collect(),
+        ..Contacts::default()
+    };
+    let mut warnings = Vec::new();
     for (number, (name, contact)) in scene.contact.iter().enumerate() {
         let surfaces: Vec<(&SurfaceName, GatheredSurface)> = contact.surfaces().map(|s| (s, gather(s))).collect();
         let (slave, Conditions { mut pairs, mut masters, .. }, rule) = match (&contact.sides, &surfaces[..]) {
@@ -63,12 +71,12 @@ pub(super) fn pair(
         });
         if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
             let found = sagitta::unresolved(&surfaces[slave].1, &master.1, &pairs);
-            all.warnings.extend(found.map(|found| extent::unresolved(name, &found, pairs.len())));
+            warnings.extend(found.map(|found| extent::unresolved(name, &found, pairs.len())));
         }
         let sites = extent::sites(&surfaces[slave].1, &pairs);
         let extent = |body: &String| &extents[scene.body.keys().position(|known| known == body).expect("it exists")];
         let bodies: Vec<_> = surfaces.iter().map(|(surface, _)| (&surface.body, extent(&surface.body))).collect();
-        all.warnings.extend(extent::overlap(name, &pairs, &sites, &bodies));
+        warnings.extend(extent::overlap(name, &pairs, &sites, &bodies));
         all.rows.push(ContactRow {
             name: name.clone(),
             slave: surfaces[slave].0.to_string(),
@@ -82,9 +90,8 @@ pub(super) fn pair(
         all.pairs.extend(pairs);
         all.sites.extend(sites);
     }
-    let names: Vec<String> = scene.contact.keys().cloned().collect();
-    corner::check(&names, &all.pairs, held)?;
-    Ok(all)
+    corner::check(&all.names, &all.pairs, held)?;
+    Ok((all, warnings))
 }
 
 fn rule_name(rule: Rule) -> &'static str {

@@ -1,21 +1,20 @@
 //! The discrete problem of a scene: meshes, subdomains, contact pairs, rows.
 
+use std::collections::BTreeMap;
+
 use super::ModelError;
-use super::bodies::{MeshError, Meshes};
 use super::conditions::{self, RightHandSides};
-use super::contacts::{self, Paired};
-use super::extent::{self, Extent, Site};
+use super::contacts::{self, Contacts};
+use super::extent::{self, Extent};
+use super::meshes::{MeshError, Meshes};
 use crate::assembly::loads::Load;
 use crate::comm::Comm;
 use crate::constraint::{Constraints, Support};
-use crate::contact::{ContactPair, MasterNode};
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
 use crate::material::{Law, Material};
 use crate::mesh::Face;
 use crate::monitor::timing::peak_rss_mb;
-use crate::record::counts::ContactRow;
 use crate::scene::{self, Scene, SurfaceName};
-use crate::study::contact::Touching;
 
 /// One rank's part of the discrete problem.
 pub struct Discrete {
@@ -27,16 +26,8 @@ pub struct Discrete {
     pub surfaces: Vec<Surface>,
     /// Own subdomains and interface.
     pub decomposition: Decomposition,
-    /// Names of the contacts.
-    pub contacts: Vec<String>,
-    /// How they were paired.
-    pub contact_rows: Vec<ContactRow>,
-    /// All contact pairs of the scene.
-    pub pairs: Vec<ContactPair>,
-    /// Nodes of all master surfaces that have slaves opposite.
-    pub masters: Vec<MasterNode>,
-    /// Where each of the pairs is.
-    pub sites: Vec<Site>,
+    /// What may touch what, and the conditions of it.
+    pub contacts: Contacts,
     /// Least and largest coordinates of each body.
     pub extents: Vec<Extent>,
     /// Supports, in the order of their names.
@@ -45,21 +36,12 @@ pub struct Discrete {
     pub loads: Vec<Load>,
     /// Own rows of B.
     pub constraints: Constraints,
-    /// What the user should know of the meshes.
-    pub warnings: Vec<String>,
-    /// Indices of the surfaces in contact.
-    pub touching: Vec<usize>,
     /// Right-hand sides of the rows over the load history.
     pub right_hand_sides: RightHandSides,
+    /// What the user should know of the meshes.
+    pub warnings: Vec<String>,
     /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
     pub reading_mb: Option<f64>,
-}
-
-impl Discrete {
-    /// Its contacts, for results.
-    pub fn touching(&self) -> Touching<'_> {
-        Touching { names: &self.contacts, pairs: &self.pairs, masters: &self.masters }
-    }
 }
 
 /// Discretises a scene. Collective.
@@ -79,81 +61,112 @@ pub fn discretise_expecting(
     yielding: Option<&[Vec<bool>]>,
     comm: &dyn Comm,
 ) -> Result<Discrete, ModelError> {
+    // Bodies and the surfaces that the scene names.
     let Meshes { bodies, solids, mut warnings } = Meshes::new(scene, comm)?;
     let materials: Vec<Material> = scene.material.values().copied().collect();
-    let number =
-        |name: &str| scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies");
-    let surface = |name: &SurfaceName| {
-        let body = number(&name.body);
-        let patch = match (bodies[body].brick(), name.face()) {
-            (Some(_), Some(face)) => Patch::Face(Face::ALL[face as usize]),
-            _ => Patch::Named(name.surface.clone()),
-        };
-        Surface { body, patch }
-    };
-    let mut surfaces: Vec<Surface> = scene.surfaces().map(surface).collect();
-    surfaces.sort_unstable();
-    surfaces.dedup();
-    let index = |name: &SurfaceName| surfaces.binary_search(&surface(name)).expect("every named surface is listed");
-    let touching: Vec<usize> = scene.contact.values().flat_map(scene::Contact::surfaces).map(index).collect();
+    let named = Named::new(scene, &bodies);
 
-    let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &surfaces, contact: &touching };
+    // Subdomains.
+    let touching: Vec<usize> =
+        scene.contact.values().flat_map(scene::Contact::surfaces).map(|s| named.index(s)).collect();
+    let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &named.surfaces, contact: &touching };
     let cut = cut(&scene.decomposition.method, &bodies);
     can_be_cut(scene, &bodies, cut)?;
     let decomposition = decomposition::tear(&torn, cut, scene.decomposition.cluster, yielding, comm);
     drop(solids);
     let reading_mb = reading_mb(&bodies, comm);
 
-    let supports: Vec<Support> = scene
-        .support
-        .iter()
-        .map(|(name, s)| Support {
-            name: name.clone(),
-            surface: index(&s.surface),
-            fixed: scene::Axis::ALL.map(|a| s.fix.contains(&a)),
-            displacement: s.displacement.unwrap_or_default(),
-        })
-        .collect();
+    // What holds, touches and loads them.
+    let supports: Vec<Support> = scene.support.iter().map(|(name, s)| support(name, s, &named)).collect();
     let extents = extent::extents(comm, &decomposition.subdomains, bodies.len());
-    let Paired { pairs, masters, sites, rows: contact_rows, warnings: of_contacts } =
-        contacts::pair(scene, comm, &decomposition, &supports, &extents, index)?;
+    let index = |name: &SurfaceName| named.index(name);
+    let (contacts, of_contacts) = contacts::pair(scene, comm, &decomposition, &supports, &extents, index)?;
     warnings.extend(of_contacts);
-    let load = |load: &scene::Load| match load {
-        scene::Load::Traction { surface, traction } => Load::Traction { surface: index(surface), value: *traction },
-        scene::Load::Pressure { surface, pressure } => Load::Pressure { surface: index(surface), value: *pressure },
-        scene::Load::BodyForce { body, body_force } => Load::BodyForce { body: number(body), value: *body_force },
-    };
-    let loads = scene.load.values().map(load).collect();
-    let contacts: Vec<String> = scene.contact.keys().cloned().collect();
+    let loads = scene.load.values().map(|it| load(scene, it, &named)).collect();
+
+    // Rows of B.
     let young: Vec<f64> = decomposition.subdomains.iter().map(|s| materials[s.material].hooke().young).collect();
-    let stiffness = comm.all_gather(&young, &decomposition.shares.counts(1));
     let given = conditions::Given {
         decomposition: &decomposition,
         supports: &supports,
-        contacts: &contacts,
-        pairs: &pairs,
-        stiffness: &stiffness,
+        contacts: &contacts.names,
+        pairs: &contacts.pairs,
+        stiffness: &comm.all_gather(&young, &decomposition.shares.counts(1)),
     };
     let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given)?;
+    let surfaces = named.surfaces;
     Ok(Discrete {
         bodies,
         materials,
         surfaces,
         decomposition,
         contacts,
-        contact_rows,
-        pairs,
-        masters,
-        sites,
         extents,
         supports,
         loads,
         constraints,
-        warnings,
-        touching,
-        reading_mb,
         right_hand_sides,
+        warnings,
+        reading_mb,
     })
+}
+
+/// The surfaces that a scene names, each once.
+struct Named {
+    surfaces: Vec<Surface>,
+    /// Index of each name among them.
+    of_name: BTreeMap<SurfaceName, usize>,
+}
+
+impl Named {
+    fn new(scene: &Scene, bodies: &[BodyMesh]) -> Self {
+        let surface = |name: &SurfaceName| {
+            let body = body_number(scene, &name.body);
+            let patch = match (bodies[body].brick(), name.face()) {
+                (Some(_), Some(face)) => Patch::Face(Face::ALL[face as usize]),
+                _ => Patch::Named(name.surface.clone()),
+            };
+            Surface { body, patch }
+        };
+        let mut surfaces: Vec<Surface> = scene.surfaces().map(surface).collect();
+        surfaces.sort_unstable();
+        surfaces.dedup();
+        let index = |name| surfaces.binary_search(&surface(name)).expect("every named surface is listed");
+        let of_name = scene.surfaces().map(|name| (name.clone(), index(name))).collect();
+        Self { surfaces, of_name }
+    }
+
+    fn index(&self, name: &SurfaceName) -> usize {
+        self.of_name[name]
+    }
+}
+
+/// Index of a body that the scene names.
+fn body_number(scene: &Scene, name: &str) -> usize {
+    scene.body.keys().position(|known| known == name).expect("a checked scene names its bodies")
+}
+
+fn support(name: &str, support: &scene::Support, named: &Named) -> Support {
+    Support {
+        name: name.to_owned(),
+        surface: named.index(&support.surface),
+        fixed: scene::Axis::ALL.map(|a| support.fix.contains(&a)),
+        displacement: support.displacement.unwrap_or_default(),
+    }
+}
+
+fn load(scene: &Scene, load: &scene::Load, named: &Named) -> Load {
+    match load {
+        scene::Load::Traction { surface, traction } => {
+            Load::Traction { surface: named.index(surface), value: *traction }
+        }
+        scene::Load::Pressure { surface, pressure } => {
+            Load::Pressure { surface: named.index(surface), value: *pressure }
+        }
+        scene::Load::BodyForce { body, body_force } => {
+            Load::BodyForce { body: body_number(scene, body), value: *body_force }
+        }
+    }
 }
 
 /// Rank 0's largest resident memory so far if it has read a mesh. Collective.

@@ -1,22 +1,22 @@
 //! From a scene to its discrete problem: meshes, subdomains, contact conditions, rows of B and loads.
 //!
-//! [`bodies`] reads and makes the meshes, [`contacts`] pairs the surfaces, [`conditions`] makes the rows and their right-hand
+//! [`meshes`] reads and makes the meshes, [`contacts`] pairs the surfaces, [`conditions`] makes the rows and their right-hand
 //! sides, [`extent`] measures bodies and places, [`discrete`] joins all to the problem of one rank. [`history`] has loads and
 //! right-hand sides of each load step, [`held`] tells whether anything moves freely.
 
-pub mod bodies;
 pub mod conditions;
 pub mod contacts;
 pub mod discrete;
 pub mod extent;
 pub mod held;
 pub mod history;
+pub mod meshes;
 
 pub use discrete::{Discrete, discretise, discretise_expecting};
 
 use thiserror::Error;
 
-use self::bodies::MeshError;
+use self::meshes::MeshError;
 use crate::contact::ContactError;
 use crate::feti::coarse::Floating;
 

@@ -81,11 +81,11 @@ fn conditions(
     comm: &dyn Comm,
 ) -> Vec<ContactRow> {
     let of_coarse = Counted::new(coarse).expect("the scene's bodies are counted");
-    let all: u64 = discrete.contact_rows.iter().map(|row| row.conditions).sum();
+    let all: u64 = discrete.contacts.rows.iter().map(|row| row.conditions).sum();
     let with_row = super::sizes(discrete, comm).contact_rows as f64 / all.max(1) as f64;
     let is_brick = |surface: &SurfaceName| scene.body[&surface.body].brick().is_some();
     let (mut rows, mut is_exact) = (Vec::new(), true);
-    for (contact, row) in scene.contact.values().zip(&discrete.contact_rows) {
+    for (contact, row) in scene.contact.values().zip(&discrete.contacts.rows) {
         let mut row = row.clone();
         let mut surfaces = contact.surfaces();
         if let Some(known) = contacts::count(scene, contact) {

@@ -19,7 +19,7 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
     let space = RowSpace::new(comm, &decomposition.shares, constraints);
     let mut partial = Vec::new();
     for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
-        let touches = subdomain.facets.iter().any(|facet| discrete.touching.contains(&facet.surface));
+        let touches = subdomain.facets.iter().any(|facet| discrete.contacts.surfaces.contains(&facet.surface));
         let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0, f64::from(touches)];
         for &row in rows {
             counts[match constraints.rows[row as usize].kind {
@@ -50,7 +50,7 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
 /// Memory that solving would take: as the model of [`mod@super::memory`] has it, from the analysis of all subdomains.
 /// Subdomains of equal connectivity are analysed once. Collective.
 pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
-    let Discrete { decomposition, constraints, pairs, .. } = discrete;
+    let Discrete { decomposition, constraints, contacts, .. } = discrete;
     let is_box = matches!(cut(&scene.decomposition.method, &discrete.bodies), Cut::Bricks(_));
     let lengths = |s: &Rc<Symbolic>| {
         let lengths = [s.analysis().factor_length(), s.pattern.rows.len(), s.pattern.dofs()];
@@ -67,7 +67,7 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
     let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
     Memory {
         subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0],
-        rank_mb: memory::of_rank_mb(subdomains, clusters, pairs.len() as f64, largest),
+        rank_mb: memory::of_rank_mb(subdomains, clusters, contacts.pairs.len() as f64, largest),
         cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)),
     }
 }

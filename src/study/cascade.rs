@@ -17,8 +17,8 @@ use crate::feti::Torn;
 use crate::material::Material;
 use crate::mesh::Brick;
 use crate::model::Discrete;
-use crate::model::bodies;
 use crate::model::discrete::cut;
+use crate::model::meshes;
 use crate::newton;
 use crate::scene::Scene;
 
@@ -30,7 +30,7 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
         (&coarse.bodies, &coarse.decomposition.subdomains, &solved.u),
         (&fine.bodies, &fine.decomposition.subdomains),
     );
-    let (from, to) = ((&coarse.bodies[..], &coarse.pairs[..]), (&fine.bodies[..], &fine.pairs[..]));
+    let (from, to) = ((&coarse.bodies[..], &coarse.contacts.pairs[..]), (&fine.bodies[..], &fine.contacts.pairs[..]));
     let closed = closed_contacts(comm, from, &solved.closed, to);
     let kept = |kind| if let Kind::Contact { pair } = kind { closed[pair] } else { true };
     newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect() }
@@ -39,7 +39,7 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
 /// Which boxes of a finer mesh are likely to yield, from where a solved scene does; see [`discretise_expecting`]. `None` if
 /// the mesh is not cut into boxes. Collective.
 pub fn expected_yielding(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<Vec<bool>>> {
-    let bodies = bodies::bricks(fine)?;
+    let bodies = meshes::bricks(fine)?;
     let Cut::Bricks(cells) = cut(&fine.decomposition.method, &bodies) else { return None };
     let (coarse, solved) = coarse;
     let material = |s: &Subdomain| &coarse.materials[s.material];
@@ -235,11 +235,17 @@ mod tests {
             let body = &d.bodies[1];
             brick(body).coordinates(brick(body).node_position(pair.slave - body.first_node))
         };
-        let closed: Vec<u64> =
-            (0..coarse.pairs.len() as u64).filter(|&k| place(&coarse, &coarse.pairs[k as usize])[0] < 2.5).collect();
-        let found = closed_contacts(&Solo, (&coarse.bodies, &coarse.pairs), &closed, (&fine.bodies, &fine.pairs));
+        let closed: Vec<u64> = (0..coarse.contacts.pairs.len() as u64)
+            .filter(|&k| place(&coarse, &coarse.contacts.pairs[k as usize])[0] < 2.5)
+            .collect();
+        let found = closed_contacts(
+            &Solo,
+            (&coarse.bodies, &coarse.contacts.pairs),
+            &closed,
+            (&fine.bodies, &fine.contacts.pairs),
+        );
         assert!(found.contains(&true) && found.contains(&false));
-        for (pair, found) in fine.pairs.iter().zip(found) {
+        for (pair, found) in fine.contacts.pairs.iter().zip(found) {
             assert_eq!(found, place(&fine, pair)[0] < 2.5, "{:?}", place(&fine, pair));
         }
     }

@@ -8,8 +8,9 @@
 use std::collections::BTreeMap;
 
 use crate::constraint::law::Status;
-use crate::contact::{ContactPair, MasterNode};
+use crate::contact::MasterNode;
 use crate::decomposition::Subdomain;
+use crate::model::contacts::Contacts;
 use crate::results::piece::Field;
 
 /// Contact at one pair.
@@ -25,17 +26,6 @@ pub struct ContactState {
     pub status: Status,
 }
 
-/// All contacts of a scene.
-#[derive(Clone, Copy)]
-pub struct Touching<'a> {
-    /// Their names.
-    pub names: &'a [String],
-    /// Their conditions.
-    pub pairs: &'a [ContactPair],
-    /// Their master nodes.
-    pub masters: &'a [MasterNode],
-}
-
 /// Contact at the nodes of a rank's subdomains.
 struct AtNodes {
     /// Zero where nothing touches.
@@ -47,7 +37,7 @@ struct AtNodes {
 }
 
 /// Fields of the nodes of these subdomains, one behind the other; `states` are those of the pairs whose rows are on this rank.
-pub fn fields(subdomains: &[Subdomain], touching: Touching, states: &[ContactState]) -> Vec<Field> {
+pub fn fields(subdomains: &[Subdomain], touching: &Contacts, states: &[ContactState]) -> Vec<Field> {
     let known = Known::new(touching, states);
     let of = |wanted: &dyn Fn(usize) -> bool| {
         let parts = subdomains.iter().map(|subdomain| known.at_nodes(subdomain, wanted));
@@ -69,7 +59,7 @@ pub fn fields(subdomains: &[Subdomain], touching: Touching, states: &[ContactSta
 }
 
 /// Contacts that have a node in common with another one.
-fn sharing(Touching { names, pairs, masters }: Touching) -> Vec<usize> {
+fn sharing(Contacts { names, pairs, masters, .. }: &Contacts) -> Vec<usize> {
     let slaves = pairs.iter().filter(|pair| pair.covered).map(|pair| (pair.slave, pair.contact));
     let masters = masters.iter().map(|node| (node.node, pairs[node.pairs[0].0].contact));
     let mut of_node: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
@@ -94,7 +84,7 @@ struct Known<'a> {
 }
 
 impl<'a> Known<'a> {
-    fn new(Touching { pairs, masters, .. }: Touching<'a>, states: &'a [ContactState]) -> Self {
+    fn new(Contacts { pairs, masters, .. }: &'a Contacts, states: &'a [ContactState]) -> Self {
         let mut pressures = vec![0.0; pairs.len()];
         states.iter().for_each(|state| pressures[state.pair] = state.force / pairs[state.pair].area);
         let covered = states.iter().filter(|state| pairs[state.pair].covered);

@@ -1,9 +1,10 @@
 //! The solution as fields on one rank's mesh: what ParaView shows.
 
-use super::contact::{self, ContactState, Touching};
+use super::contact::{self, ContactState};
 use crate::assembly::internal;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
+use crate::model::contacts::Contacts;
 use crate::newton::{Iterate, Newton, TornProblem};
 use crate::results::piece::{Field, Piece};
 
@@ -36,7 +37,7 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
 
 /// Adds the iterate to the mesh, at the time of its increment; returns the largest von Mises stress in this rank's elements. `contact` holds
 /// the pairs whose rows are here.
-pub fn record(piece: &mut Piece, newton: &Newton, touching: Touching, contact: &[ContactState]) -> f64 {
+pub fn record(piece: &mut Piece, newton: &Newton, touching: &Contacts, contact: &[ContactState]) -> f64 {
     let (problem, Iterate { u, errors, .. }) = (newton.problem(), newton.iterate());
     let displacement: Vec<[f64; 3]> = u.iter().flat_map(|u| u.as_chunks::<3>().0).copied().collect();
     let (stress, plastic): (Vec<f64>, _) = element_states(problem, u).unzip();

@@ -76,7 +76,7 @@ pub(super) fn measure(
 ) -> Measures {
     let (problem, at, u) = (newton.problem(), newton.at(), &newton.iterate().u);
     let of_nodes = displacements(comm, discrete, u);
-    let mut state_of = vec![None; discrete.pairs.len()];
+    let mut state_of = vec![None; discrete.contacts.pairs.len()];
     contact.iter().for_each(|state| state_of[state.pair] = Some(state.status));
     let mut partial = Vec::new();
     let subdomains = problem.subdomains.iter().zip(u).zip(problem.space.owned());
@@ -102,7 +102,7 @@ pub(super) fn measure(
         (value > 0.0 && value.is_finite()).then(|| Extreme { value, of: name(of), at: place })
     };
     let body = |of: usize| scene.body.keys().nth(of).cloned().unwrap_or_default();
-    let contact = |of: usize| discrete.contacts.get(of).cloned().unwrap_or_default();
+    let contact = |of: usize| discrete.contacts.names.get(of).cloned().unwrap_or_default();
     Measures {
         max_strain: found(0, &body),
         max_rotation: found(1, &body),
@@ -141,7 +141,7 @@ fn add_contact(
     at: At,
     of_nodes: &HashMap<u64, [f64; 3]>,
 ) {
-    let (pair, Site { place, facet }) = (&discrete.pairs[index], discrete.sites[index]);
+    let (pair, Site { place, facet }) = (&discrete.contacts.pairs[index], discrete.contacts.sites[index]);
     let (name, contact) = scene.contact.iter().nth(pair.contact).expect("a pair belongs to a contact");
     let masters = pair.masters.iter().map(|(node, weight)| (*node, -weight));
     let moved = contact.displacement().map(|d| -d * obstacle_factor(scene, name, at));
@@ -170,7 +170,7 @@ fn obstacle_factor(scene: &Scene, name: &str, at: At) -> f64 {
 fn displacements(comm: &dyn Comm, discrete: &Discrete, u: &Torn) -> HashMap<u64, [f64; 3]> {
     let mut mine = Vec::new();
     for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(u) {
-        let facets = subdomain.facets.iter().filter(|facet| discrete.touching.contains(&facet.surface));
+        let facets = subdomain.facets.iter().filter(|facet| discrete.contacts.surfaces.contains(&facet.surface));
         let nodes: BTreeSet<u32> = facets.flat_map(|facet| facet.nodes.iter().copied()).collect();
         for node in nodes.into_iter().map(|node| node as usize) {
             mine.push(subdomain.nodes[node]);
@@ -189,7 +189,7 @@ fn rounding(scene: &Scene, discrete: &Discrete, of_bodies: &[Worst]) -> Option<E
     let coordinates = discrete.extents.iter().flatten().flatten();
     let farthest = coordinates.fold(0.0_f64, |farthest, x| farthest.max(x.abs()));
     let Worst { value: stretch, of, place } = of_bodies[3];
-    let is_strained = of_bodies[0].value > NO_STRAIN && stretch.is_finite() && !discrete.pairs.is_empty();
+    let is_strained = of_bodies[0].value > NO_STRAIN && stretch.is_finite() && !discrete.contacts.pairs.is_empty();
     let name = || scene.body.keys().nth(of).cloned().unwrap_or_default();
     is_strained.then(|| Extreme { value: f64::EPSILON * farthest / stretch, of: name(), at: place })
 }

@@ -50,7 +50,7 @@ impl<'a> Recorder<'a> {
     pub fn record(&mut self, newton: &Newton) {
         let Self { scene, discrete, comm, .. } = *self;
         let contact = report::contact_states(newton.problem(), newton.iterate());
-        let von_mises = fields::record(&mut self.piece, newton, discrete.touching(), &contact);
+        let von_mises = fields::record(&mut self.piece, newton, &discrete.contacts, &contact);
         self.rows.push(report::step_row(comm, scene, discrete, newton, &contact, von_mises));
         self.closed = contact.iter().filter(|state| state.status.is_closed()).map(|state| state.pair as u64).collect();
     }

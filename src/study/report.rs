@@ -4,6 +4,7 @@ use super::contact::ContactState;
 use super::limits;
 use crate::comm::Comm;
 use crate::constraint::Kind;
+use crate::model::contacts::Contacts;
 use crate::model::discrete::Discrete;
 use crate::model::held::load_step;
 use crate::newton::balance::BodyBalance;
@@ -135,7 +136,7 @@ pub(super) fn summarise(
     };
     Summary {
         title: scene.title.clone(),
-        contacts: discrete.contact_rows.clone(),
+        contacts: discrete.contacts.rows.clone(),
         converged: Some(failure.is_none()),
         plastic_fraction: state.plastic_elements.map(|plastic| plastic as f64 / sizes.elements as f64),
         newton_iterations: Some(steps.len() as u64),
@@ -173,7 +174,7 @@ fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[Contact
         contact_force: Some(std::array::from_fn(|axis| {
             contact_forces.iter().fold(0.0, |sum, force| sum + force[axis])
         })),
-        contact_forces: discrete.contacts.iter().cloned().zip(contact_forces).collect(),
+        contact_forces: discrete.contacts.names.iter().cloned().zip(contact_forces).collect(),
         reactions: names.zip(reactions).collect(),
         external_work: Some(state.external_work),
         internal_energy: Some(state.internal_energy),
@@ -237,17 +238,17 @@ fn contact_forces(
     discrete: &Discrete,
     contact: &[ContactState],
 ) -> Vec<[f64; 3]> {
-    let Discrete { contacts, pairs, contact_rows, .. } = discrete;
+    let Contacts { names, pairs, rows, .. } = &discrete.contacts;
     let is_slave = |(contact, row): (&scene::Contact, &ContactRow)| {
         contact.surfaces().next().is_some_and(|first| first.to_string() == row.slave)
     };
-    let signs = scene.contact.values().zip(contact_rows).map(|of| if is_slave(of) { 1.0 } else { -1.0 });
+    let signs = scene.contact.values().zip(rows).map(|of| if is_slave(of) { 1.0 } else { -1.0 });
     let signs: Vec<f64> = signs.collect();
     let mut of_pair = vec![None; pairs.len()];
     contact.iter().for_each(|state| of_pair[state.pair] = Some(state.force));
     let mut partial = Vec::new();
     for rows in problem.space.owned() {
-        let mut sums = vec![[0.0; 3]; contacts.len()];
+        let mut sums = vec![[0.0; 3]; names.len()];
         for &row in rows {
             if let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind {
                 let contact = pairs[pair].contact;
@@ -257,6 +258,6 @@ fn contact_forces(
         }
         partial.extend_from_slice(sums.as_flattened());
     }
-    let sum = problem.space.sum(&partial, 3 * contacts.len());
+    let sum = problem.space.sum(&partial, 3 * names.len());
     sum.as_chunks::<3>().0.to_vec()
 }

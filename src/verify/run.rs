@@ -209,10 +209,10 @@ impl<'a> Run<'a> {
     /// All contact conditions: place of the slave node, pressure, and the area it acts on. Collective.
     pub fn contacts(&self) -> Vec<Touch> {
         let found = self.solved.piece.last("contact_pressure").expect("results have this field");
-        let mut mine = vec![f64::NEG_INFINITY; 4 * self.discrete.pairs.len()];
+        let mut mine = vec![f64::NEG_INFINITY; 4 * self.discrete.contacts.pairs.len()];
         let mut first = 0;
         for (subdomain, _) in self.subdomains() {
-            for (pair, mine) in self.discrete.pairs.iter().zip(mine.as_chunks_mut::<4>().0) {
+            for (pair, mine) in self.discrete.contacts.pairs.iter().zip(mine.as_chunks_mut::<4>().0) {
                 if let Some(node) = subdomain.local_node(pair.slave) {
                     let [x, y, z] = subdomain.points[node];
                     *mine = [x, y, z, found[first + node]];
@@ -226,7 +226,7 @@ impl<'a> Run<'a> {
             pressure: *pressure,
             area: pair.area,
         };
-        self.discrete.pairs.iter().zip(all.as_chunks::<4>().0).map(touch).collect()
+        self.discrete.contacts.pairs.iter().zip(all.as_chunks::<4>().0).map(touch).collect()
     }
 }
 

@@ -147,9 +147,9 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
 
 /// What tells a row of a contact from others, however bodies are cut: the number of the contact, the slave node, and the smooth
 /// part of the surface around it.
-fn contact(Discrete { constraints, pairs, .. }: &Discrete, row: usize) -> Option<[i64; 3]> {
+fn contact(Discrete { constraints, contacts, .. }: &Discrete, row: usize) -> Option<[i64; 3]> {
     let Kind::Contact { pair } = constraints.rows[row].kind else { return None };
-    let ContactPair { contact, slave, part, .. } = pairs[pair];
+    let ContactPair { contact, slave, part, .. } = contacts.pairs[pair];
     Some([contact as i64, slave as i64, i64::from(part)])
 }
 

@@ -18,9 +18,9 @@ use self::structured::Structured;
 use super::memory::{self, Lengths, Memory, SLOT, megabytes};
 use crate::decomposition::{BodyMesh, Cut, bricks, cost, tetrahedra};
 use crate::element::Kind;
-use crate::model::bodies;
-use crate::model::bodies::MeshError;
 use crate::model::discrete::{can_be_cut, cut};
+use crate::model::meshes;
+use crate::model::meshes::MeshError;
 use crate::record::counts::Sizes;
 use crate::scene::{Axis, Body, Contact, Scene, SurfaceName};
 
@@ -42,7 +42,7 @@ impl<'a> Counted<'a> {
     /// Counts the bodies of a scene; `None` if there are meshes from files.
     pub fn new(scene: &'a Scene) -> Option<Self> {
         let shapes = scene.body.values().map(Structured::new).collect::<Option<Vec<_>>>()?;
-        let bodies = bodies::of_counts(scene, shapes.iter().map(Structured::counts));
+        let bodies = meshes::of_counts(scene, shapes.iter().map(Structured::counts));
         Some(Self::of_shapes(scene, bodies, shapes))
     }
 

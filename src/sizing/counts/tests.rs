@@ -83,7 +83,7 @@ fn bricks_in_boxes_are_counted_exactly() {
         let scene = scene(&text);
         let (mut counted, built, discrete) = both(&scene);
         assert!(counted.estimated.is_empty());
-        for (contact, row) in scene.contact.values().zip(&discrete.contact_rows) {
+        for (contact, row) in scene.contact.values().zip(&discrete.contacts.rows) {
             let found =
                 contacts::count(&scene, contact).unwrap_or_else(|| panic!("{} is not counted\n{text}", row.name));
             assert_eq!((found.rule, found.all), (&row.rule[..], row.conditions), "{}\n{text}", row.name);
