@@ -65,10 +65,7 @@ pub(super) fn pair(
             }
             _ => unreachable!("two sides have two surfaces"),
         };
-        pairs.iter_mut().for_each(|pair| match contact.clearance {
-            Some(clearance) => pair.set_distance(clearance),
-            None => pair.widen(contact.gap),
-        });
+        set_distances(contact, &mut pairs);
         if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
             let found = sagitta::unresolved(&surfaces[slave].1, &master.1, &pairs);
             warnings.extend(found.map(|found| extent::unresolved(name, &found, pairs.len())));
@@ -92,6 +89,14 @@ pub(super) fn pair(
     }
     corner::check(&all.names, &all.pairs, held)?;
     Ok((all, warnings))
+}
+
+/// The distances that a contact wants: its clearance, or those of the meshes and its gap.
+fn set_distances(contact: &Contact, pairs: &mut [ContactPair]) {
+    pairs.iter_mut().for_each(|pair| match contact.clearance {
+        Some(clearance) => pair.set_distance(clearance),
+        None => pair.widen(contact.gap),
+    });
 }
 
 fn rule_name(rule: Rule) -> &'static str {
