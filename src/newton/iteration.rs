@@ -198,7 +198,8 @@ impl<'a> Newton<'a> {
                 }
             }
         };
-        let (solved, length) = (step.outcome, damped.length);
+        let (solved, length, mut statistics) = (step.outcome, damped.length, step.statistics);
+        refused.iter().for_each(|trial: &Step| statistics += trial.statistics);
         let criterion = self.criterion(&damped, timer);
         let left = self.move_to(&step, damped, timer);
         let record = StepRecord {
@@ -209,7 +210,7 @@ impl<'a> Newton<'a> {
             energy: self.iterate.state.energy,
             plastic_elements: self.iterate.state.plastic,
             active_contacts: self.problem.active_contacts(&self.iterate.lambda),
-            statistics: refused.iter().fold(step.statistics, |sum, trial: &Step| sum + trial.statistics),
+            statistics,
             local_residual: step.local_residual,
             applications: step.applications + refused.iter().map(|trial| trial.applications).sum::<usize>(),
             factorisations: step.factorisations + refused.iter().map(|trial| trial.factorisations).sum::<usize>(),

@@ -9,12 +9,11 @@ use super::dual::{Dual, DualFace, Multipliers};
 use super::forcing::Forcing;
 use super::problem::TornProblem;
 use crate::feti::coarse::face::CoarseFace;
-use crate::feti::coarse::projector::Projector;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::qp::feasible::FeasibleSet;
 use crate::qp::mprgp::Expansion;
 use crate::qp::pcpg::Pcpg;
-use crate::qp::quadratic::{Projection, Space};
+use crate::qp::quadratic::{Quadratic, Space};
 use crate::qp::{Limits, Outcome, Statistics, active_set, power, smalse};
 
 /// Which solver takes a program with inequalities.
@@ -123,22 +122,22 @@ impl Programs {
 
     /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch.
     /// Collective.
-    pub fn start(&self, projector: &Projector, last: &[f64], resultants: Vec<f64>) -> Warm {
+    pub fn start(&self, coarse: &Coarse, last: &[f64], resultants: Vec<f64>) -> Warm {
         let rows = last.len();
         let Some(face) = &self.face else {
             let mut lambda = vec![0.0; rows];
-            projector.particular(&resultants, &mut lambda);
+            coarse.particular(&resultants, &mut lambda);
             return Warm { resultants, lambda };
         };
         let mut lambda = last.to_vec();
-        let missing: Vec<f64> = resultants.iter().zip(projector.coarse().apply(&lambda)).map(|(e, b)| e - b).collect();
+        let missing: Vec<f64> = resultants.iter().zip(coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
         let size = resultants.iter().map(|e| e * e).sum::<f64>().sqrt();
         if face.unbalanced(&missing, size).is_none() {
             // Open contacts stay open.
-            face.add_balance(projector.coarse(), missing, &mut lambda);
+            face.add_balance(coarse, missing, &mut lambda);
         } else {
             let mut change = vec![0.0; rows];
-            projector.particular(&missing, &mut change);
+            coarse.particular(&missing, &mut change);
             lambda.iter_mut().zip(change).for_each(|(l, c)| *l += c);
         }
         Warm { resultants, lambda }
@@ -204,7 +203,7 @@ impl Programs {
         let space = Multipliers(problem.space, dual.timer);
         let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
         let at_floor = self.note(&limits, report.first_norm);
-        self.face = Some(self.take_face(dual.projector.coarse(), lambda.len())?);
+        self.face = Some(self.take_face(dual.coarse, lambda.len())?);
         let (outcome, statistics) = (report.outcome, report.statistics);
         Ok(Found { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
     }
@@ -219,7 +218,7 @@ impl Programs {
     ) -> Result<Found, Floating> {
         let space = Multipliers(problem.space, dual.timer);
         let bounded = problem.constraints.laws().may_open();
-        let rows = self.take_face(dual.projector.coarse(), bounded.len())?;
+        let rows = self.take_face(dual.coarse, bounded.len())?;
         let mut kept = rows.kept().to_vec();
         let mut face =
             DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants: &warm.resultants, rows };
@@ -246,10 +245,10 @@ impl Programs {
         b: Vec<f64>,
         limits: Limits,
     ) -> Result<Found, Floating> {
-        let (timer, projector) = (dual.timer, dual.projector);
+        let (timer, coarse) = (dual.timer, dual.coarse);
         let space = Multipliers(problem.space, timer);
         let mut projected = b.clone();
-        let mean = timer.time("coarse problem", || projector.project(&mut projected));
+        let mean = timer.time("coarse problem", || coarse.project(&mut projected));
         let mut statistics = Statistics::default();
         let (mut x, mut outcome, mut at_floor) = (vec![0.0; b.len()], Outcome::Converged, true);
         if space.norm(&projected) != 0.0 {
@@ -261,10 +260,10 @@ impl Programs {
             // The multiplier of G x = 0 follows from b on the rows that the last program kept. The slack of open contacts
             // is part of b too, but is no rigid motion.
             let multiplier = self.face.as_ref().map(|face| {
-                let mut a = face.amplitudes(projector.coarse(), &b);
+                let mut a = face.amplitudes(coarse, &b);
                 a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
                 let mut multiplier = vec![0.0; b.len()];
-                projector.coarse().add_transpose(1.0, &a, &mut multiplier);
+                coarse.add_transpose(1.0, &a, &mut multiplier);
                 multiplier
             });
             let lower = problem.constraints.laws().lower_bounds(&start);
@@ -287,7 +286,7 @@ impl Programs {
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         let kept = problem.constraints.laws().kept(&lambda, 0.0);
-        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(projector.coarse(), kept))?);
+        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(coarse, kept))?);
         Ok(Found { lambda, balanced, outcome, statistics, at_floor })
     }
 

@@ -202,9 +202,9 @@ impl Run<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dense::{Plain, distance, dot};
     use super::super::power;
-    use super::super::torn::{Torn, homogenised};
+    use super::super::tests::dense::{Plain, distance, dot};
+    use super::super::tests::torn::{Torn, homogenised};
     use super::*;
 
     const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };

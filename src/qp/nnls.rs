@@ -4,7 +4,9 @@
 //! joins, columns that would turn negative leave. At the end the residual r = b - A x has A'r <= 0 and x'A'r = 0. So if r is
 //! not zero no nonnegative x reaches b, and r shows why: b'r = |r|^2 > 0, but no column goes along r (Farkas).
 
+use super::axpy;
 use crate::vector::{dot, length};
+
 /// Share of |b| that a unit column must have along the residual to join, and share of a column that must be new.
 const ROUNDING: f64 = 1e-12;
 
@@ -34,7 +36,7 @@ pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
         if join(columns, b, new, &mut joined, &mut x) {
             barred.fill(false);
             residual.copy_from_slice(b);
-            joined.iter().for_each(|&k| subtract(&mut residual, x[k], &columns[k]));
+            joined.iter().for_each(|&k| axpy(-x[k], &columns[k], &mut residual));
         } else {
             barred[new] = true;
         }
@@ -98,7 +100,7 @@ fn least_squares(columns: &[Vec<f64>], chosen: &[usize], b: &[f64]) -> Option<Ve
         for _ in 0..2 {
             for (direction, share) in directions.iter().zip(&mut shares) {
                 let along = dot(direction, &rest);
-                subtract(&mut rest, along, direction);
+                axpy(-along, direction, &mut rest);
                 *share += along;
             }
         }
@@ -121,10 +123,6 @@ fn least_squares(columns: &[Vec<f64>], chosen: &[usize], b: &[f64]) -> Option<Ve
     Some(x)
 }
 
-fn subtract(x: &mut [f64], factor: f64, y: &[f64]) {
-    x.iter_mut().zip(y).for_each(|(x, y)| *x -= factor * y);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -143,7 +141,7 @@ mod tests {
             let chosen: Vec<usize> = (0..columns.len()).filter(|k| set >> k & 1 == 1).collect();
             let Some(x) = least_squares(columns, &chosen, b).filter(|x| x.iter().all(|x| *x >= 0.0)) else { continue };
             let mut residual = b.to_vec();
-            chosen.iter().zip(x).for_each(|(&k, x)| subtract(&mut residual, x, &columns[k]));
+            chosen.iter().zip(x).for_each(|(&k, x)| axpy(-x, &columns[k], &mut residual));
             best = best.min(length(&residual));
         }
         best

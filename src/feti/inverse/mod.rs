@@ -24,7 +24,7 @@ use self::basis::Bases;
 use self::factor::{Factors, NotDefinite, Symbolic};
 use self::hybrid::Hybrid;
 use self::schur::Schur;
-use self::tangents::{Factorising, Iterate, Tangents};
+use self::tangents::{Factorising, Linearisation, Tangents};
 use super::Torn;
 use crate::assembly::Region;
 use crate::decomposition::Subdomain;
@@ -65,13 +65,13 @@ impl Inverse {
     /// The first tangent that is singular. Those behind it keep their factors.
     pub fn update(
         &mut self,
-        iterate: &Iterate,
+        at: &Linearisation,
         left: f64,
         interiors: Option<&mut Schur>,
         timer: &Timer,
     ) -> Result<Vec<bool>, NotDefinite> {
         self.pins = false;
-        self.tangents.update(iterate, left, &mut Factorising { factors: &mut self.factors, schur: interiors, timer })
+        self.tangents.update(at, left, &mut Factorising { factors: &mut self.factors, schur: interiors, timer })
     }
 
     /// Makes the clusters follow the factors of their members.
@@ -128,19 +128,19 @@ impl Inverse {
 
     /// Another solve follows, from what is committed now.
     pub fn begin(&mut self) {
-        self.tangents.commit();
+        self.tangents.bases.iter_mut().for_each(Bases::commit);
     }
 
     /// The next update makes all factors anew.
     pub fn forget(&mut self) {
-        self.tangents.drop_factors();
+        self.tangents.bases.iter_mut().for_each(|bases| bases.factor = None);
     }
 
     /// From now on factorises in double precision, and the next update makes all factors anew; false if that was so before.
     pub fn sharpen(&mut self) -> bool {
         let before = self.factors.precision();
         self.factors.set_precision(Precision::Double);
-        self.tangents.drop_factors();
+        self.forget();
         before == Precision::Single
     }
 
@@ -159,7 +159,7 @@ impl Inverse {
 
     /// Refines `x = K^+ r` of each subdomain by itself, see [`refine::refine`].
     pub fn refine(&mut self, norm: &dyn Fn(&Torn) -> f64, at: (&Torn, &mut Torn), share: f64) -> (f64, usize) {
-        refine::refine(&mut self.factors, self.tangents.values(), norm, at, share)
+        refine::refine(&mut self.factors, &self.tangents.values, norm, at, share)
     }
 
     /// Closes the bonds of clusters in a displacement, see [`Hybrid::rejoin`].
@@ -189,7 +189,7 @@ impl Inverse {
 
     /// Analysis and lower values of an own subdomain's tangent as it was factorised last.
     pub fn stiffness(&self, own: usize) -> (&Symbolic, &[f64]) {
-        (self.factors.symbolic(own), &self.tangents.values()[own])
+        (self.factors.symbolic(own), &self.tangents.values[own])
     }
 
     /// What new factors are stored in at least.
@@ -199,7 +199,7 @@ impl Inverse {
 
     /// What the factors of each own subdomain are of.
     pub fn bases(&self) -> &[Bases] {
-        self.tangents.bases()
+        &self.tangents.bases
     }
 
     /// Bytes of factors that one [`Inverse::solve`] reads.
