@@ -36,16 +36,8 @@ pub struct ProgramSettings {
     pub products: usize,
 }
 
-/// Where a program starts.
-pub struct Warm {
-    /// `e = R'f_k`: forces and moments on all clusters, whole on every rank.
-    pub resultants: Vec<f64>,
-    /// Multipliers with `G l = e`.
-    pub lambda: Vec<f64>,
-}
-
-/// Its solution.
-pub struct Found {
+/// The multipliers that solve a program.
+pub struct DualSolution {
     /// Admissible multipliers (the laws of the rows hold exactly, `G l = e` to the tolerance).
     pub lambda: Vec<f64>,
     /// Multipliers with `G l = e` to round-off, admissible to the tolerance.
@@ -120,14 +112,13 @@ impl Programs {
         self.face = CoarseFace::new(coarse, kept).ok();
     }
 
-    /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch.
-    /// Collective.
-    pub fn start(&self, coarse: &Coarse, last: &[f64], resultants: Vec<f64>) -> Warm {
-        let rows = last.len();
+    /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch. `resultants` are
+    /// `e = R'f_k`: forces and moments on all clusters, whole on every rank. Collective.
+    pub fn start(&self, coarse: &Coarse, last: &[f64], resultants: &[f64]) -> Vec<f64> {
         let Some(face) = &self.face else {
-            let mut lambda = vec![0.0; rows];
-            coarse.particular(&resultants, &mut lambda);
-            return Warm { resultants, lambda };
+            let mut lambda = vec![0.0; last.len()];
+            coarse.particular(resultants, &mut lambda);
+            return lambda;
         };
         let mut lambda = last.to_vec();
         let missing: Vec<f64> = resultants.iter().zip(coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
@@ -136,14 +127,14 @@ impl Programs {
             // Open contacts stay open.
             face.add_balance(coarse, missing, &mut lambda);
         } else {
-            let mut change = vec![0.0; rows];
+            let mut change = vec![0.0; last.len()];
             coarse.particular(&missing, &mut change);
             lambda.iter_mut().zip(change).for_each(|(l, c)| *l += c);
         }
-        Warm { resultants, lambda }
+        lambda
     }
 
-    /// Solves a program with the residual `b` at its start. [`Programs::face`] has the kept rows afterwards. Collective.
+    /// Solves the program with these `resultants` `e` from multipliers `l` with `G l = e`, where its residual is `b`. [`Programs::face`] has the kept rows afterwards. Collective.
     ///
     /// # Errors
     /// If these rows leave a rigid motion free.
@@ -151,10 +142,10 @@ impl Programs {
         &mut self,
         problem: &TornProblem,
         mut dual: Dual,
-        warm: Warm,
-        b: Vec<f64>,
+        resultants: &[f64],
+        (lambda, b): (Vec<f64>, Vec<f64>),
         forcing: Forcing,
-    ) -> Result<Found, Floating> {
+    ) -> Result<DualSolution, Floating> {
         let limits = Limits {
             relative: self.settings.tolerance * forcing.floor,
             reference: self.reference,
@@ -163,18 +154,18 @@ impl Programs {
             products: self.settings.products,
         };
         if !problem.constraints.has_inequalities {
-            return self.equalities(problem, dual, warm.lambda, b, limits);
+            return self.equalities(problem, dual, lambda, b, limits);
         }
         let mut wasted = Statistics::default();
         if self.settings.method == Method::ActiveSet {
-            let found = self.active_set(problem, &mut dual, &warm, b.clone(), limits)?;
+            let found = self.active_set(problem, &mut dual, resultants, (lambda.clone(), b.clone()), limits)?;
             if found.outcome != Outcome::Cycled {
                 return Ok(found);
             }
             wasted = found.statistics;
             dual.restrict_scaling(problem.constraints, &vec![true; b.len()]);
         }
-        let mut found = self.smalse(problem, dual, warm.lambda, b, limits)?;
+        let mut found = self.smalse(problem, dual, lambda, b, limits)?;
         found.statistics += wasted;
         Ok(found)
     }
@@ -199,42 +190,41 @@ impl Programs {
         mut lambda: Vec<f64>,
         mut residual: Vec<f64>,
         limits: Limits,
-    ) -> Result<Found, Floating> {
+    ) -> Result<DualSolution, Floating> {
         let space = Multipliers(problem.space, dual.timer);
         let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
         let at_floor = self.note(&limits, report.first_norm);
         self.face = Some(self.take_face(dual.coarse, lambda.len())?);
         let (outcome, statistics) = (report.outcome, report.statistics);
-        Ok(Found { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
+        Ok(DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
     }
 
     fn active_set(
         &mut self,
         problem: &TornProblem,
         dual: &mut Dual,
-        warm: &Warm,
-        residual: Vec<f64>,
+        resultants: &[f64],
+        (x, residual): (Vec<f64>, Vec<f64>),
         limits: Limits,
-    ) -> Result<Found, Floating> {
+    ) -> Result<DualSolution, Floating> {
         let space = Multipliers(problem.space, dual.timer);
         let bounded = problem.constraints.laws().may_open();
         let rows = self.take_face(dual.coarse, bounded.len())?;
         let mut kept = rows.kept().to_vec();
-        let mut face =
-            DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants: &warm.resultants, rows };
+        let mut face = DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants, rows };
         if !face.complete(&mut kept) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
-            return Ok(Found { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
+            return Ok(DualSolution { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
-        let start = active_set::Start { x: warm.lambda.clone(), residual, kept, uneven: problem.constraints.uneven };
+        let start = active_set::Guess { x, residual, kept, uneven: problem.constraints.uneven };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let at_floor = self.note(&limits, solution.first_norm);
         let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;
         let mut lambda = balanced.clone();
         problem.constraints.laws().project(&mut lambda);
         self.face = Some(face.rows);
-        Ok(Found { lambda, balanced, outcome, statistics, at_floor })
+        Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor })
     }
 
     fn smalse(
@@ -244,7 +234,7 @@ impl Programs {
         start: Vec<f64>,
         b: Vec<f64>,
         limits: Limits,
-    ) -> Result<Found, Floating> {
+    ) -> Result<DualSolution, Floating> {
         let (timer, coarse) = (dual.timer, dual.coarse);
         let space = Multipliers(problem.space, timer);
         let mut projected = b.clone();
@@ -287,7 +277,7 @@ impl Programs {
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         let kept = problem.constraints.laws().kept(&lambda, 0.0);
         self.face = Some(timer.time("coarse set-up", || CoarseFace::new(coarse, kept))?);
-        Ok(Found { lambda, balanced, outcome, statistics, at_floor })
+        Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor })
     }
 
     /// Takes the `first` residual of a program down as the reference of all tolerances, if it is that of the first program

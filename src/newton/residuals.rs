@@ -35,8 +35,8 @@ impl Residuals {
     }
 }
 
-/// `a / b`, and zero where there is nothing to compare with and nothing wrong.
-fn relative(a: f64, b: f64) -> f64 {
+/// `a / b`; zero if `a` is, whatever `b`.
+pub(super) fn relative(a: f64, b: f64) -> f64 {
     if a == 0.0 { 0.0 } else { a / b }
 }
 

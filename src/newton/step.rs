@@ -13,7 +13,7 @@ use std::sync::Arc;
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
 use super::problem::{State, TornProblem};
-use super::program::{Found, ProgramSettings, ProgramState, Programs, Warm};
+use super::program::{DualSolution, ProgramSettings, ProgramState, Programs};
 use crate::assembly::flow::{self, Flow};
 use crate::feti::Torn;
 use crate::feti::coarse::Coarse;
@@ -59,7 +59,7 @@ pub struct SolverState {
     pub flows: Vec<Flow>,
     /// What new factors are stored in at least.
     pub precision: Precision,
-    /// The states whose tangents the factors of each own subdomain are of.
+    /// The states that the factors of each own subdomain were made from.
     pub bases: Vec<Bases>,
 }
 
@@ -180,9 +180,13 @@ impl<'a> StepSolver<'a> {
         let lifted = self.operator.lift(problem.constraints, &mut forces, &mut open);
 
         // lambda (14), from multipliers with G lambda = e and the residual d - F lambda there.
-        let warm = self.start(problem, &forces, last, timer);
+        let (resultants, lambda) = timer.time("coarse problem", || {
+            let e = recover::resultants(problem.subdomains, problem.modes, &self.coarse, &forces);
+            let lambda = self.programs.start(&self.coarse, last, &e);
+            (e, lambda)
+        });
         let mut residual = vec![0.0; slack.len()];
-        self.respond(&warm.lambda, &mut forces.clone(), &mut residual, timer);
+        self.respond(&lambda, &mut forces.clone(), &mut residual, timer);
         residual.iter_mut().zip(&open).for_each(|(r, c)| *r -= c);
         let dual = Dual {
             operator: &mut self.operator,
@@ -192,7 +196,7 @@ impl<'a> StepSolver<'a> {
             timer,
             alive: &|applications| alive(applications - before),
         };
-        let found = self.programs.solve(problem, dual, warm, residual, forcing);
+        let found = self.programs.solve(problem, dual, &resultants, (lambda, residual), forcing);
         let mut found = found.map_err(|floating| floating.to_string())?;
 
         // du = K^+ (f_k - B'lambda) + R alpha.
@@ -207,7 +211,7 @@ impl<'a> StepSolver<'a> {
             preconditioner.close(problem.constraints, &slack, face.kept(), &mut recovered.du, timer);
         }
         let Recovered { du, local_residual, refined } = recovered;
-        let Found { lambda, outcome, statistics, at_floor, .. } = found;
+        let DualSolution { lambda, outcome, statistics, at_floor, .. } = found;
         let applications = self.operator.applications() - before + refined;
         Ok(Step { du, lambda, outcome, statistics, at_floor, local_residual, applications, factorisations })
     }
@@ -232,26 +236,18 @@ impl<'a> StepSolver<'a> {
         Ok(changes.fresh.into_iter().filter(|fresh| *fresh).count())
     }
 
-    /// `e = R'f_k`, and multipliers next to the `last` ones with `G lambda = e`. Collective.
-    fn start(&self, problem: &TornProblem, forces: &Torn, last: &[f64], timer: &Timer) -> Warm {
-        timer.time("coarse problem", || {
-            let resultants = recover::resultants(problem.subdomains, problem.modes, &self.coarse, forces);
-            self.programs.start(&self.coarse, last, resultants)
-        })
-    }
-
     /// `du` from the forces `f_k` and the multipliers that were `found`, to which it adds what the program does not see; `open` is
     /// `c_k`. The subdomains' problems are solved to `wanted`, relative. Collective.
     fn recover(
         &mut self,
         problem: &TornProblem,
         (forces, open): (&Torn, &[f64]),
-        found: &mut Found,
+        found: &mut DualSolution,
         wanted: f64,
         timer: &Timer,
     ) -> Recovered {
         let constraints = problem.constraints;
-        let Found { lambda, balanced, .. } = found;
+        let DualSolution { lambda, balanced, .. } = found;
 
         // K^+ (f_k - B'lambda), by the multipliers that are in balance, and what rounding leaves of K du = f_k - B'lambda.
         let (mut du, mut defect) = (forces.clone(), vec![0.0; open.len()]);

@@ -12,7 +12,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// What was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Solution {
+pub struct Shares {
     /// The unknowns, not negative.
     pub x: Vec<f64>,
     /// `b - A x`.
@@ -20,7 +20,7 @@ pub struct Solution {
 }
 
 /// Solves the problem for the columns of A, each as long as b.
-pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
+pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Shares {
     let norms: Vec<f64> = columns.iter().map(length).collect();
     let threshold = ROUNDING * length(b);
     let mut x = vec![0.0; columns.len()];
@@ -41,7 +41,7 @@ pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
             barred[new] = true;
         }
     }
-    Solution { x, residual }
+    Shares { x, residual }
 }
 
 /// The `y` of the smallest norm with `row . y <= bound` for all rows, or `None` if there is none.
@@ -57,7 +57,7 @@ pub fn least_distance(rows: &[Vec<f64>], bounds: &[f64]) -> Option<Vec<f64>> {
     let columns: Vec<Vec<f64>> = rows.iter().zip(bounds).map(column).collect();
     let mut target = vec![0.0; n + 1];
     target[n] = 1.0;
-    let Solution { residual, .. } = solve(&columns, &target);
+    let Shares { residual, .. } = solve(&columns, &target);
     let last = residual[n];
     (length(&residual) > FEASIBLE).then(|| residual[..n].iter().map(|r| -scale * r / last).collect())
 }
@@ -156,7 +156,7 @@ mod tests {
             columns[5] = columns[2].clone();
             columns[6] = vec![0.0; 4];
             columns[7] = columns[0].iter().zip(&columns[1]).map(|(a, b)| a + b).collect();
-            let Solution { x, residual } = solve(&columns, &b);
+            let Shares { x, residual } = solve(&columns, &b);
             assert!((length(&residual) - enumerated(&columns, &b)).abs() < 1e-9, "{seed}");
             for (x, column) in x.iter().zip(&columns) {
                 let along = dot(column, &residual);

@@ -35,8 +35,8 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
     piece
 }
 
-/// Adds the iterate to the mesh, at the time of its increment; returns the largest von Mises stress in this rank's elements. `contact` holds
-/// the pairs whose rows are here.
+/// Adds the iterate to the mesh, at the time of its increment; `contact` holds the pairs whose rows are on this rank. Returns the
+/// largest von Mises stress in this rank's elements.
 pub fn record(piece: &mut Piece, newton: &Newton, touching: &Contacts, contact: &[ContactState]) -> f64 {
     let (problem, Iterate { u, errors, .. }) = (newton.problem(), newton.iterate());
     let displacement: Vec<[f64; 3]> = u.iter().flat_map(|u| u.as_chunks::<3>().0).copied().collect();

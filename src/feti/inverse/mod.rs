@@ -3,7 +3,7 @@
 //! [`Inverse`] is the whole: set up in [`Inverse::new`], given its numbers by [`Inverse::update`], applied by [`Inverse::solve`].
 //! [`kernel`] has the rigid modes, [`factor`] the factors of whole subdomains, [`schur`] those of their interiors with the Schur
 //! complement, [`stock`] the scratch that their solves share. [`tangents`] decides which factors are kept, shared or made
-//! again, from what they are made of ([`basis`]); [`refine`] makes up for the digits that they lack. [`pinnable`] finds unknowns
+//! again, from the states that they were made from ([`basis`]). [`refine`] recovers the digits that they lack. [`pinnable`] finds unknowns
 //! that factors may keep at zero. [`hybrid`] joins subdomains to clusters.
 //!
 //! All here is local to a rank.
@@ -83,7 +83,7 @@ impl Inverse {
         timer.time("clusters", || hybrid.update(&mut self.factors))
     }
 
-    /// Makes factors again from what they were made of, to the same bits, in at least this precision.
+    /// Makes factors again from their former states, to the same bits, in at least this precision.
     ///
     /// # Errors
     /// The first tangent that is singular. Those behind it have no factors.
@@ -197,7 +197,7 @@ impl Inverse {
         self.factors.precision()
     }
 
-    /// What the factors of each own subdomain are of.
+    /// The states that the factors of each own subdomain were made from.
     pub fn bases(&self) -> &[Bases] {
         &self.tangents.bases
     }

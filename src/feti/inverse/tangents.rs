@@ -50,7 +50,7 @@ pub(super) struct Tangents {
     twins: Vec<Option<usize>>,
     /// Lower values of each own subdomain's tangent.
     pub values: Vec<Rc<Vec<f64>>>,
-    /// The states whose tangents the factors of each own subdomain are of.
+    /// The states that the factors of each own subdomain were made from.
     pub bases: Vec<Bases>,
     /// Scratch: a tangent that may be worth factorising.
     assembled: Vec<f64>,
@@ -252,7 +252,7 @@ impl Tangents {
     }
 }
 
-/// Lower values of the tangent that a factor is of.
+/// Lower values of the tangent at the state that a factor is made from.
 fn tangent(region: &Region, own: usize, basis: &Basis, factors: &Factors) -> Vec<f64> {
     let pattern = &factors.symbolic(own).pattern;
     let mut values = vec![0.0; pattern.rows.len()];
