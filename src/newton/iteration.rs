@@ -200,7 +200,8 @@ impl<'a> Newton<'a> {
         };
         let (solved, length, mut statistics) = (step.outcome, damped.length, step.statistics);
         refused.iter().for_each(|trial: &Step| statistics += trial.statistics);
-        let criterion = self.criterion(&damped, timer);
+        let change = || self.problem.relative_change(&self.iterate.u, &damped.u, &damped.state.terms);
+        let criterion = timer.time("residuals", change);
         let left = self.move_to(&step, damped, timer);
         let record = StepRecord {
             number: self.steps.len() - self.before + 1,
@@ -266,11 +267,6 @@ impl<'a> Newton<'a> {
                 Trial::Refused(step)
             }
         }
-    }
-
-    /// The paper's stopping criterion `|u+ - u|_e / (|u+|_e + |u|_e)`.
-    fn criterion(&self, next: &Damped, timer: &Timer) -> f64 {
-        timer.time("residuals", || self.problem.relative_change(&self.iterate.u, &next.u, &next.state.terms))
     }
 
     /// Takes the step; returns the displacement that it left, and the problem there.

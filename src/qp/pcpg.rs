@@ -158,20 +158,15 @@ impl<'a> Pcpg<'a> {
         } else {
             z.copy_from_slice(r);
         }
-        self.orthogonalise(&mut z);
-        z
-    }
-
-    /// Takes the kept directions out of `z`, in the A-inner product.
-    fn orthogonalise(&self, z: &mut [f64]) {
-        let pairs: Vec<_> = self.kept.iter().map(|d| (&*z, &d.ap[..])).collect();
+        let pairs: Vec<_> = self.kept.iter().map(|d| (&z[..], &d.ap[..])).collect();
         if pairs.is_empty() {
-            return;
+            return z;
         }
         let coefficients = self.space.dots(&pairs);
         for (d, c) in self.kept.iter().zip(coefficients) {
-            axpy(-c / d.curvature, &d.p, z);
+            axpy(-c / d.curvature, &d.p, &mut z);
         }
+        z
     }
 
     fn keep(&mut self, direction: Direction) {

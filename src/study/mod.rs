@@ -120,7 +120,7 @@ pub fn solve(
 
     let failure = follow(scene, &mut newton, &mut recorder, timer, watcher)?;
 
-    let summary = summarise(scene, discrete, (newton.steps(), &failure), std::mem::take(&mut recorder.rows), comm);
+    let summary = summarise(scene, discrete, newton.steps(), &failure, std::mem::take(&mut recorder.rows), comm);
     let (problem, u) = newton.finish();
     let meshes = restart::meshes::meshes(comm, scene, discrete);
     let mesh_names = serde_json::to_string(&meshes).expect("names and numbers can be written");

@@ -118,7 +118,8 @@ pub(super) fn contact_states(problem: &TornProblem, Iterate { u, lambda, .. }: &
 pub(super) fn summarise(
     scene: &Scene,
     discrete: &Discrete,
-    (steps, failure): (&[(usize, StepRecord)], &Option<(At, newton::Outcome)>),
+    steps: &[(usize, StepRecord)],
+    failure: &Option<(At, newton::Outcome)>,
     rows: Vec<StepRow>,
     comm: &dyn Comm,
 ) -> Summary {
