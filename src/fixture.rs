@@ -14,7 +14,7 @@ use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::{Factors, analyse};
 use crate::feti::inverse::hybrid::Hybrid;
-use crate::feti::inverse::tangents::Iterate;
+use crate::feti::inverse::tangents::Linearisation;
 use crate::feti::{Interconnection, Torn};
 use crate::material::Material;
 use crate::model;
@@ -200,7 +200,7 @@ impl<'a> Setup<'a> {
         let mut stiffnesses = Vec::new();
         for (own, subdomain) in self.subdomains().iter().enumerate() {
             let values = elastic(subdomain, self.material(own), &factors.symbolic(own).pattern);
-            factors.factorise(own, subdomain, &values, false).expect("elastic bodies are stiff");
+            factors.factorise(own, subdomain, &values, &[], false).expect("elastic bodies are stiff");
             stiffnesses.push(values);
         }
         (factors, stiffnesses)
@@ -219,8 +219,8 @@ impl<'a> Setup<'a> {
             |subdomain| Region { subdomain, material: &self.discrete.materials[subdomain.material], history: &[] };
         let regions: Vec<Region> = self.subdomains().iter().map(region).collect();
         let (u, yielding, flows) = (&self.gather.zeros(), &vec![0; count][..], &vec![Flow::default(); count][..]);
-        let iterate = Iterate { regions: &regions, u, yielding, flows };
-        operator.update(&iterate, 0.0, None, &self.space, &timer).expect("elastic bodies are stiff");
+        let at = Linearisation { regions: &regions, u, yielding, flows };
+        operator.update(&at, 0.0, None, &self.space, &timer).expect("elastic bodies are stiff");
         operator
     }
 

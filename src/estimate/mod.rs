@@ -32,8 +32,9 @@ use crate::assembly::Region;
 use crate::assembly::stress::{self, Sample};
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
+use crate::element::Kind;
 use crate::feti::Torn;
-use crate::material::{Law, Material};
+use crate::material::Law;
 use crate::tensor::Voigt;
 
 /// Squares of the discretisation error of own elements, and of their stress.
@@ -50,41 +51,44 @@ pub fn estimate(sums: &NodeSums, regions: &[Region], u: &Torn) -> Estimate {
     let subdomains: Vec<&Subdomain> = regions.iter().map(|region| region.subdomain).collect();
     // All samples together would take more memory than it takes time to have them twice.
     let recovered = recovery::recover(sums, &subdomains, |own| stress::samples(&regions[own], &u[own]));
-    let (mut errors, mut stresses) = (Vec::new(), Vec::new());
-    for ((region, u), recovered) in regions.iter().zip(u).zip(&recovered) {
-        let at = |nodes: &[u32], values: &[f64]| {
-            let mut stress = [0.0; 6];
-            for (&node, value) in nodes.iter().zip(values) {
-                stress.iter_mut().zip(recovered[node as usize]).for_each(|(s, r)| *s += value * r);
-            }
-            stress
-        };
-        let samples = stress::samples(region, u);
-        errors.push(squares(region, &samples, &rule::squares(region.subdomain.elements.kind()), at));
-        stresses.push(stress_square(region.material, &samples));
-    }
-    Estimate { errors, stresses }
+    let at = |own: usize, nodes: &[u32], values: &[f64]| {
+        let mut stress = [0.0; 6];
+        for (&node, value) in nodes.iter().zip(values) {
+            stress.iter_mut().zip(recovered[own][node as usize]).for_each(|(s, r)| *s += value * r);
+        }
+        stress
+    };
+    difference(regions, u, rule::squares, at)
 }
 
 /// The error itself, in the same norm, where the exact stress is known: of an own subdomain at a place.
 pub fn error(regions: &[Region], u: &Torn, exact: impl Fn(usize, [f64; 3]) -> Voigt) -> Estimate {
-    let (mut errors, mut stresses) = (Vec::new(), Vec::new());
-    for (own, (region, u)) in regions.iter().zip(u).enumerate() {
-        let Subdomain { points, elements, .. } = region.subdomain;
-        let at = |nodes: &[u32], values: &[f64]| {
-            let along = |i: usize| nodes.iter().zip(values).map(|(&n, value)| value * points[n as usize][i]).sum();
-            exact(own, std::array::from_fn(along))
-        };
-        let samples = stress::samples(region, u);
-        errors.push(squares(region, &samples, &rule::fine(elements.kind()), at));
-        stresses.push(stress_square(region.material, &samples));
-    }
-    Estimate { errors, stresses }
+    let at = |own: usize, nodes: &[u32], values: &[f64]| {
+        let points = &regions[own].subdomain.points;
+        let along = |i: usize| nodes.iter().zip(values).map(|(&n, value)| value * points[n as usize][i]).sum();
+        exact(own, std::array::from_fn(along))
+    };
+    difference(regions, u, rule::fine, at)
 }
 
-/// `int sigma_h : C^-1 : sigma_h`.
-fn stress_square(material: &Material, samples: &[Sample]) -> f64 {
-    samples.iter().map(|s| s.weight * material.hooke().complementary_square(&s.stress)).sum()
+/// How far the stresses at `u` are from others, integrated by a rule: `stress` gives these from the number of an own subdomain, the
+/// nodes of an element and the values of their shape functions.
+fn difference(
+    regions: &[Region],
+    u: &Torn,
+    rule: impl Fn(Kind) -> Vec<Place>,
+    stress: impl Fn(usize, &[u32], &[f64]) -> Voigt,
+) -> Estimate {
+    let of = |(own, (region, u)): (usize, (&Region, &Vec<f64>))| {
+        let samples = stress::samples(region, u);
+        let rule = rule(region.subdomain.elements.kind());
+        let errors = squares(region, &samples, &rule, |nodes, values| stress(own, nodes, values));
+        let hooke = region.material.hooke();
+        let size = samples.iter().map(|s| s.weight * hooke.complementary_square(&s.stress)).sum::<f64>();
+        (errors, size)
+    };
+    let (errors, stresses) = regions.iter().zip(u).enumerate().map(of).unzip();
+    Estimate { errors, stresses }
 }
 
 /// `int (sigma - sigma_h) : C^-1 : (sigma - sigma_h)` over each element, where `stress` gives sigma from the nodes of an

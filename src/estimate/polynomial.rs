@@ -7,11 +7,11 @@ use crate::tensor::Voigt;
 
 /// Monomials of degree 2.
 const MOST: usize = 10;
-/// Part of the mean square of each monomial that is added to its moment, where the samples tell all ...
+/// Part of the mean square of each monomial that is added to its moment, where the samples determine the polynomial ...
 const RIDGE: f64 = 1e-9;
-/// ... and where they do not: slopes that are hardly told are small then.
+/// ... and where they do not: slopes that they hardly determine become small.
 const STRONG_RIDGE: f64 = 1e-2;
-/// Samples tell a polynomial if every monomial has this mean square beyond what those before it explain.
+/// Samples determine a polynomial if every monomial has this mean square beyond what those before it explain.
 const TOLD: f64 = 1e-3;
 
 /// Number of monomials up to a degree.
@@ -22,11 +22,6 @@ pub fn monomials(degree: usize) -> usize {
 /// Numbers that the sums of a node take.
 pub fn width(n: usize) -> usize {
     n * (n + 1) / 2 + 6 * n
-}
-
-/// The way between two places.
-pub fn way(from: [f64; 3], to: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| to[i] - from[i])
 }
 
 /// The monomials at a place beside the node.
@@ -48,7 +43,7 @@ pub fn add(n: usize, way: [f64; 3], stress: &Voigt, sums: &mut [f64]) {
     }
 }
 
-/// The polynomial that fits the samples best, and whether they tell it; a careful one if not.
+/// Fits a polynomial to the samples by least squares. Returns whether they determine it; if not, its slopes are kept small.
 pub fn fit(n: usize, sums: &[f64], coefficients: &mut [f64]) -> bool {
     let told = fit_with(RIDGE, n, sums, coefficients) > TOLD;
     if !told {

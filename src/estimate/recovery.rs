@@ -7,6 +7,7 @@ use crate::assembly::stress::Sample;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::tensor::Voigt;
+use crate::vector::{cross, difference};
 
 /// How far polynomials reach from inside to the boundary: to vertices on faces, and from these to edges and corners that
 /// have no neighbour inside.
@@ -102,7 +103,7 @@ impl<'a> Patches<'a> {
             for &node in nodes {
                 let sums = &mut sums[width * self.number(node)..][CLOSURE..width];
                 for sample in samples {
-                    polynomial::add(self.n, polynomial::way(self.point(node), sample.place), &sample.stress, sums);
+                    polynomial::add(self.n, difference(sample.place, self.point(node)), &sample.stress, sums);
                 }
             }
         }
@@ -143,7 +144,7 @@ impl<'a> Patches<'a> {
                 let Some(open) = self.open[self.number(node)] else { continue };
                 let offer = &mut offers[width * open as usize..][..width];
                 for &giver in givers() {
-                    let way = polynomial::way(self.point(giver), self.point(node));
+                    let way = difference(self.point(node), self.point(giver));
                     polynomial::add_moved(self.polynomial(self.number(giver)), way, offer);
                     offer[width - 1] += 1.0;
                 }
@@ -178,7 +179,7 @@ impl<'a> Patches<'a> {
         for nodes in &self.subdomain.elements {
             for (&middle, &(a, b)) in nodes[kind.cell().corners()..].iter().zip(kind.middles()) {
                 let from = |end: usize| {
-                    let way = polynomial::way(self.point(nodes[end]), self.point(middle));
+                    let way = difference(self.point(middle), self.point(nodes[end]));
                     polynomial::value(self.polynomial(self.number(nodes[end])), way)
                 };
                 // In an order that all elements around the edge agree on.
@@ -195,8 +196,8 @@ fn area(corners: impl Iterator<Item = [f64; 3]> + Clone) -> [f64; 3] {
     let mut area = [0.0; 3];
     let Some(first) = corners.clone().next() else { return area };
     for (b, c) in corners.clone().skip(1).zip(corners.skip(2)) {
-        let (u, v) = (polynomial::way(first, b), polynomial::way(first, c));
-        (0..3).for_each(|i| area[i] += 0.5 * (u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]));
+        let twice = cross(difference(b, first), difference(c, first));
+        area.iter_mut().zip(twice).for_each(|(area, twice)| *area += 0.5 * twice);
     }
     area
 }

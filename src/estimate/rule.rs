@@ -9,11 +9,11 @@ use crate::element::{Cell, Kind};
 
 /// A point of a rule.
 pub struct Place {
-    /// Its volume is this combination of those of the integration points.
+    /// Weights of the volumes of the integration points in the volume of this one.
     pub volume: Vec<f64>,
-    /// What is known at integration points is here this combination.
+    /// Weights of values at the integration points in the value here.
     pub samples: Vec<f64>,
-    /// What is known at nodes is here this combination: the values of the shape functions.
+    /// Weights of values at the nodes in the value here: the values of the shape functions.
     pub nodes: Vec<f64>,
 }
 

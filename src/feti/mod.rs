@@ -6,7 +6,7 @@
 //! - [`inverse`]: `R` and `K^+` of each subdomain, and which factors are kept;
 //! - [`dual`]: `B`, `F`, and inner products of multipliers;
 //! - [`coarse`]: `G`, `(G G')^-1`, `P`, and the rigid motions `alpha`;
-//! - [`preconditioner`]: what stands for the inverse of `F`.
+//! - [`preconditioner`]: approximate inverses of `F`.
 //!
 //! [`interconnection`] is what all of them need of a torn problem: `B`, inner products of multipliers, `R`.
 //!

@@ -6,9 +6,11 @@
 //! component of a contact's condition, that part of the contact force acts on the support and is in neither sum.
 
 use super::problem::{SIGNIFICANT, State, TornProblem};
+use super::residuals::larger;
 use crate::constraint::Kind;
 use crate::feti::Torn;
 use crate::record::state::Resultant;
+use crate::vector::length;
 
 /// What acts on a body; moments are about the mean of its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,13 +37,12 @@ impl BodyBalance {
 /// The largest unbalanced force of a body, or moment over its radius, over the largest gross force of a body. That is taken
 /// as `least` (force) if it is smaller.
 pub fn relative(bodies: &[BodyBalance], least: f64) -> f64 {
-    let size = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let scale = bodies.iter().fold(least, |largest, body| largest.max(body.gross));
     let of_body = |body: &BodyBalance| {
         let left = body.unbalanced();
-        [size(left.force), size(left.moment) / body.radius]
+        [length(left.force), length(left.moment) / body.radius]
     };
-    let worst = bodies.iter().flat_map(of_body).fold(0.0, |a: f64, b| if b.is_nan() || b > a { b } else { a });
+    let worst = bodies.iter().flat_map(of_body).fold(0.0, larger);
     if worst == 0.0 { 0.0 } else { worst / scale }
 }
 

@@ -5,13 +5,12 @@ use crate::constraint::Constraints;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::motion;
-use crate::feti::coarse::projector::Projector;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::preconditioner::Preconditioner;
 use crate::monitor::timing::Timer;
 use crate::qp::active_set::Face;
-use crate::qp::quadratic::{Operator, Projection, Quadratic, Space};
+use crate::qp::quadratic::{Quadratic, Space};
 
 /// Inner products of multipliers.
 pub struct Multipliers<'a>(pub &'a RowSpace<'a>, pub &'a Timer);
@@ -30,8 +29,8 @@ impl Space for Multipliers<'_> {
 pub struct Dual<'s, 'a> {
     /// `F`.
     pub operator: &'s mut DualOperator<'a>,
-    /// `P`.
-    pub projector: &'s Projector<'a>,
+    /// `P`, and motions of bodies.
+    pub coarse: &'s Coarse<'a>,
     /// `M`.
     pub preconditioner: Option<&'s mut Preconditioner<'a>>,
     /// Inner products of multipliers.
@@ -65,17 +64,15 @@ impl<'a> Dual<'_, 'a> {
     }
 }
 
-impl Operator for Dual<'_, '_> {
+impl Quadratic for Dual<'_, '_> {
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.timer.time("dual operator", || self.operator.apply(x, y));
-        self.timer.count("dual operator", 0.0, self.operator.bytes_per_apply());
+        self.timer.count("dual operator", 0.0, self.operator.inverse.bytes_per_solve());
         (self.alive)(self.operator.applications());
     }
-}
 
-impl Projection for Dual<'_, '_> {
     fn project(&mut self, x: &mut [f64]) {
-        self.timer.time("coarse problem", || self.projector.project(x));
+        self.timer.time("coarse problem", || self.coarse.project(x));
     }
 
     fn project_with_products(
@@ -86,11 +83,9 @@ impl Projection for Dual<'_, '_> {
         pairs: &[(&[f64], &[f64])],
     ) -> (f64, Vec<f64>) {
         let (partial, width) = self.partial(x, against, pairs);
-        self.timer.time("coarse problem", || self.projector.project_with_sums(x, &partial, width))
+        self.timer.time("coarse problem", || self.coarse.project_with_sums(x, &partial, width))
     }
-}
 
-impl Quadratic for Dual<'_, '_> {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         let Some(preconditioner) = &mut self.preconditioner else { return false };
         self.timer.time("preconditioner", || preconditioner.apply(r, z));
@@ -115,16 +110,12 @@ pub struct DualFace<'s, 'a> {
 const RESISTS: f64 = 1e-9;
 
 impl DualFace<'_, '_> {
-    fn coarse(&self) -> &Coarse<'_> {
-        self.dual.projector.coarse()
-    }
-
     /// Adds contacts until the rows of the set can balance `e`: while a free motion is left that `e` drives, those that resist
     /// it. False if none resists.
     pub fn complete(&mut self, kept: &mut [bool]) -> bool {
         let size = self.resultants.iter().map(|e| e * e).sum::<f64>().sqrt();
         while let Some(motion) = self.rows.unbalanced(self.resultants, size) {
-            let moved = self.coarse().moved(&motion);
+            let moved = self.dual.coarse.moved(&motion);
             let most = self.dual.space.maximum(moved.iter().fold(0.0, |most, m| most.max(m.abs())));
             let mut joined = 0.0;
             for ((kept, row), &moved) in kept.iter_mut().zip(&self.constraints.rows).zip(&moved) {
@@ -135,7 +126,7 @@ impl DualFace<'_, '_> {
             if self.dual.space.maximum(joined) == 0.0 {
                 return false;
             }
-            match CoarseFace::new(self.coarse(), kept.to_vec()) {
+            match CoarseFace::new(self.dual.coarse, kept.to_vec()) {
                 Ok(rows) => self.rows = rows,
                 Err(_) => return false,
             }
@@ -144,15 +135,13 @@ impl DualFace<'_, '_> {
     }
 }
 
-impl Operator for DualFace<'_, '_> {
+impl Quadratic for DualFace<'_, '_> {
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.dual.apply(x, y);
     }
-}
 
-impl Projection for DualFace<'_, '_> {
     fn project(&mut self, x: &mut [f64]) {
-        self.dual.timer.time("coarse problem", || self.rows.project(self.coarse(), x));
+        self.dual.timer.time("coarse problem", || self.rows.project(self.dual.coarse, x));
     }
 
     fn project_with_products(
@@ -164,11 +153,9 @@ impl Projection for DualFace<'_, '_> {
     ) -> (f64, Vec<f64>) {
         self.rows.mask(x);
         let (partial, width) = self.dual.partial(x, against, pairs);
-        self.dual.timer.time("coarse problem", || self.rows.project_with_sums(self.coarse(), x, &partial, width))
+        self.dual.timer.time("coarse problem", || self.rows.project_with_sums(self.dual.coarse, x, &partial, width))
     }
-}
 
-impl Quadratic for DualFace<'_, '_> {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         self.dual.precondition(r, z)
     }
@@ -177,7 +164,7 @@ impl Quadratic for DualFace<'_, '_> {
 impl Face for DualFace<'_, '_> {
     fn restrict(&mut self, kept: &mut [bool]) -> bool {
         let timer = self.dual.timer;
-        match timer.time("coarse set-up", || CoarseFace::new(self.coarse(), kept.to_vec())) {
+        match timer.time("coarse set-up", || CoarseFace::new(self.dual.coarse, kept.to_vec())) {
             Ok(rows) => self.rows = rows,
             Err(_) => return false,
         }
@@ -189,16 +176,16 @@ impl Face for DualFace<'_, '_> {
     fn restore(&mut self, x: &mut [f64]) {
         self.dual.timer.time("coarse problem", || {
             self.rows.mask(x);
-            let present = self.coarse().apply(x);
+            let present = self.dual.coarse.apply(x);
             let missing = self.resultants.iter().zip(present).map(|(e, b)| e - b).collect();
-            self.rows.add_balance(self.coarse(), missing, x);
+            self.rows.add_balance(self.dual.coarse, missing, x);
         });
     }
 
     fn gaps(&mut self, residual: &mut [f64]) {
         self.dual.timer.time("coarse problem", || {
-            let a = motion::amplitudes(&self.rows, self.coarse(), self.dual.space, residual);
-            self.coarse().add_transpose(-1.0, &a, residual);
+            let a = motion::amplitudes(&self.rows, self.dual.coarse, self.dual.space, residual);
+            self.dual.coarse.add_transpose(-1.0, &a, residual);
         });
     }
 }

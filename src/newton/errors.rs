@@ -3,6 +3,7 @@
 
 use super::StepSolver;
 use super::problem::{SIGNIFICANT, State, TornProblem};
+use super::residuals::relative;
 use crate::estimate::{self, Estimate};
 use crate::feti::Torn;
 use crate::monitor::timing::Timer;
@@ -23,13 +24,6 @@ pub struct Errors {
     pub elements: Vec<Vec<f64>>,
 }
 
-impl TornProblem<'_> {
-    /// What errors are relative to, given the sum of squares of the stress.
-    fn stress_size(&self, squares: f64, state: &State) -> f64 {
-        squares.sqrt().max(SIGNIFICANT * state.terms.energy.sqrt())
-    }
-}
-
 impl StepSolver<'_> {
     /// The errors of an admissible displacement with the multipliers of the last step. Collective.
     pub fn errors(
@@ -45,7 +39,7 @@ impl StepSolver<'_> {
         let partial: Vec<f64> =
             errors.iter().zip(stresses).flat_map(|(errors, stress)| [errors.iter().sum(), stress]).collect();
         let sum = problem.space.sum(&partial, 2);
-        let size = problem.stress_size(sum[1], state);
+        let size = sum[1].sqrt().max(SIGNIFICANT * state.terms.energy.sqrt());
         errors.iter_mut().flatten().for_each(|square| *square = relative(square.sqrt(), size));
         Errors {
             gap: certificate.gap,
@@ -55,9 +49,4 @@ impl StepSolver<'_> {
             elements: errors,
         }
     }
-}
-
-/// `a / b`; zero if `a` is, whatever `b`.
-fn relative(a: f64, b: f64) -> f64 {
-    if a == 0.0 { 0.0 } else { a / b }
 }

@@ -198,8 +198,10 @@ impl<'a> Newton<'a> {
                 }
             }
         };
-        let (solved, length) = (step.outcome, damped.length);
-        let criterion = self.criterion(&damped, timer);
+        let (solved, length, mut statistics) = (step.outcome, damped.length, step.statistics);
+        refused.iter().for_each(|trial: &Step| statistics += trial.statistics);
+        let change = || self.problem.relative_change(&self.iterate.u, &damped.u, &damped.state.terms);
+        let criterion = timer.time("residuals", change);
         let left = self.move_to(&step, damped, timer);
         let record = StepRecord {
             number: self.steps.len() - self.before + 1,
@@ -209,7 +211,7 @@ impl<'a> Newton<'a> {
             energy: self.iterate.state.energy,
             plastic_elements: self.iterate.state.plastic,
             active_contacts: self.problem.active_contacts(&self.iterate.lambda),
-            statistics: refused.iter().fold(step.statistics, |sum, trial: &Step| sum + trial.statistics),
+            statistics,
             local_residual: step.local_residual,
             applications: step.applications + refused.iter().map(|trial| trial.applications).sum::<usize>(),
             factorisations: step.factorisations + refused.iter().map(|trial| trial.factorisations).sum::<usize>(),
@@ -265,11 +267,6 @@ impl<'a> Newton<'a> {
                 Trial::Refused(step)
             }
         }
-    }
-
-    /// The paper's stopping criterion `|u+ - u|_e / (|u+|_e + |u|_e)`.
-    fn criterion(&self, next: &Damped, timer: &Timer) -> f64 {
-        timer.time("residuals", || self.problem.relative_change(&self.iterate.u, &next.u, &next.state.terms))
     }
 
     /// Takes the step; returns the displacement that it left, and the problem there.

@@ -9,12 +9,11 @@ use super::dual::{Dual, DualFace, Multipliers};
 use super::forcing::Forcing;
 use super::problem::TornProblem;
 use crate::feti::coarse::face::CoarseFace;
-use crate::feti::coarse::projector::Projector;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::qp::feasible::FeasibleSet;
 use crate::qp::mprgp::Expansion;
 use crate::qp::pcpg::Pcpg;
-use crate::qp::quadratic::{Projection, Space};
+use crate::qp::quadratic::{Quadratic, Space};
 use crate::qp::{Limits, Outcome, Statistics, active_set, power, smalse};
 
 /// Which solver takes a program with inequalities.
@@ -37,16 +36,8 @@ pub struct ProgramSettings {
     pub products: usize,
 }
 
-/// Where a program starts.
-pub struct Warm {
-    /// `e = R'f_k`: forces and moments on all clusters, whole on every rank.
-    pub resultants: Vec<f64>,
-    /// Multipliers with `G l = e`.
-    pub lambda: Vec<f64>,
-}
-
-/// Its solution.
-pub struct Found {
+/// The multipliers that solve a program.
+pub struct DualSolution {
     /// Admissible multipliers (the laws of the rows hold exactly, `G l = e` to the tolerance).
     pub lambda: Vec<f64>,
     /// Multipliers with `G l = e` to round-off, admissible to the tolerance.
@@ -121,30 +112,29 @@ impl Programs {
         self.face = CoarseFace::new(coarse, kept).ok();
     }
 
-    /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch.
-    /// Collective.
-    pub fn start(&self, projector: &Projector, last: &[f64], resultants: Vec<f64>) -> Warm {
-        let rows = last.len();
+    /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch. `resultants` are
+    /// `e = R'f_k`: forces and moments on all clusters, whole on every rank. Collective.
+    pub fn start(&self, coarse: &Coarse, last: &[f64], resultants: &[f64]) -> Vec<f64> {
         let Some(face) = &self.face else {
-            let mut lambda = vec![0.0; rows];
-            projector.particular(&resultants, &mut lambda);
-            return Warm { resultants, lambda };
+            let mut lambda = vec![0.0; last.len()];
+            coarse.particular(resultants, &mut lambda);
+            return lambda;
         };
         let mut lambda = last.to_vec();
-        let missing: Vec<f64> = resultants.iter().zip(projector.coarse().apply(&lambda)).map(|(e, b)| e - b).collect();
+        let missing: Vec<f64> = resultants.iter().zip(coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
         let size = resultants.iter().map(|e| e * e).sum::<f64>().sqrt();
         if face.unbalanced(&missing, size).is_none() {
             // Open contacts stay open.
-            face.add_balance(projector.coarse(), missing, &mut lambda);
+            face.add_balance(coarse, missing, &mut lambda);
         } else {
-            let mut change = vec![0.0; rows];
-            projector.particular(&missing, &mut change);
+            let mut change = vec![0.0; last.len()];
+            coarse.particular(&missing, &mut change);
             lambda.iter_mut().zip(change).for_each(|(l, c)| *l += c);
         }
-        Warm { resultants, lambda }
+        lambda
     }
 
-    /// Solves a program with the residual `b` at its start. [`Programs::face`] has the kept rows afterwards. Collective.
+    /// Solves the program with these `resultants` `e` from multipliers `l` with `G l = e`, where its residual is `b`. [`Programs::face`] has the kept rows afterwards. Collective.
     ///
     /// # Errors
     /// If these rows leave a rigid motion free.
@@ -152,10 +142,10 @@ impl Programs {
         &mut self,
         problem: &TornProblem,
         mut dual: Dual,
-        warm: Warm,
-        b: Vec<f64>,
+        resultants: &[f64],
+        (lambda, b): (Vec<f64>, Vec<f64>),
         forcing: Forcing,
-    ) -> Result<Found, Floating> {
+    ) -> Result<DualSolution, Floating> {
         let limits = Limits {
             relative: self.settings.tolerance * forcing.floor,
             reference: self.reference,
@@ -164,18 +154,18 @@ impl Programs {
             products: self.settings.products,
         };
         if !problem.constraints.has_inequalities {
-            return self.equalities(problem, dual, warm.lambda, b, limits);
+            return self.equalities(problem, dual, lambda, b, limits);
         }
         let mut wasted = Statistics::default();
         if self.settings.method == Method::ActiveSet {
-            let found = self.active_set(problem, &mut dual, &warm, b.clone(), limits)?;
+            let found = self.active_set(problem, &mut dual, resultants, (lambda.clone(), b.clone()), limits)?;
             if found.outcome != Outcome::Cycled {
                 return Ok(found);
             }
             wasted = found.statistics;
             dual.restrict_scaling(problem.constraints, &vec![true; b.len()]);
         }
-        let mut found = self.smalse(problem, dual, warm.lambda, b, limits)?;
+        let mut found = self.smalse(problem, dual, lambda, b, limits)?;
         found.statistics += wasted;
         Ok(found)
     }
@@ -200,42 +190,41 @@ impl Programs {
         mut lambda: Vec<f64>,
         mut residual: Vec<f64>,
         limits: Limits,
-    ) -> Result<Found, Floating> {
+    ) -> Result<DualSolution, Floating> {
         let space = Multipliers(problem.space, dual.timer);
         let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
         let at_floor = self.note(&limits, report.first_norm);
-        self.face = Some(self.take_face(dual.projector.coarse(), lambda.len())?);
+        self.face = Some(self.take_face(dual.coarse, lambda.len())?);
         let (outcome, statistics) = (report.outcome, report.statistics);
-        Ok(Found { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
+        Ok(DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
     }
 
     fn active_set(
         &mut self,
         problem: &TornProblem,
         dual: &mut Dual,
-        warm: &Warm,
-        residual: Vec<f64>,
+        resultants: &[f64],
+        (x, residual): (Vec<f64>, Vec<f64>),
         limits: Limits,
-    ) -> Result<Found, Floating> {
+    ) -> Result<DualSolution, Floating> {
         let space = Multipliers(problem.space, dual.timer);
         let bounded = problem.constraints.laws().may_open();
-        let rows = self.take_face(dual.projector.coarse(), bounded.len())?;
+        let rows = self.take_face(dual.coarse, bounded.len())?;
         let mut kept = rows.kept().to_vec();
-        let mut face =
-            DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants: &warm.resultants, rows };
+        let mut face = DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants, rows };
         if !face.complete(&mut kept) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
-            return Ok(Found { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
+            return Ok(DualSolution { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
-        let start = active_set::Start { x: warm.lambda.clone(), residual, kept, uneven: problem.constraints.uneven };
+        let start = active_set::Guess { x, residual, kept, uneven: problem.constraints.uneven };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let at_floor = self.note(&limits, solution.first_norm);
         let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;
         let mut lambda = balanced.clone();
         problem.constraints.laws().project(&mut lambda);
         self.face = Some(face.rows);
-        Ok(Found { lambda, balanced, outcome, statistics, at_floor })
+        Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor })
     }
 
     fn smalse(
@@ -245,11 +234,11 @@ impl Programs {
         start: Vec<f64>,
         b: Vec<f64>,
         limits: Limits,
-    ) -> Result<Found, Floating> {
-        let (timer, projector) = (dual.timer, dual.projector);
+    ) -> Result<DualSolution, Floating> {
+        let (timer, coarse) = (dual.timer, dual.coarse);
         let space = Multipliers(problem.space, timer);
         let mut projected = b.clone();
-        let mean = timer.time("coarse problem", || projector.project(&mut projected));
+        let mean = timer.time("coarse problem", || coarse.project(&mut projected));
         let mut statistics = Statistics::default();
         let (mut x, mut outcome, mut at_floor) = (vec![0.0; b.len()], Outcome::Converged, true);
         if space.norm(&projected) != 0.0 {
@@ -261,10 +250,10 @@ impl Programs {
             // The multiplier of G x = 0 follows from b on the rows that the last program kept. The slack of open contacts
             // is part of b too, but is no rigid motion.
             let multiplier = self.face.as_ref().map(|face| {
-                let mut a = face.amplitudes(projector.coarse(), &b);
+                let mut a = face.amplitudes(coarse, &b);
                 a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
                 let mut multiplier = vec![0.0; b.len()];
-                projector.coarse().add_transpose(1.0, &a, &mut multiplier);
+                coarse.add_transpose(1.0, &a, &mut multiplier);
                 multiplier
             });
             let lower = problem.constraints.laws().lower_bounds(&start);
@@ -287,8 +276,8 @@ impl Programs {
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         let kept = problem.constraints.laws().kept(&lambda, 0.0);
-        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(projector.coarse(), kept))?);
-        Ok(Found { lambda, balanced, outcome, statistics, at_floor })
+        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(coarse, kept))?);
+        Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor })
     }
 
     /// Takes the `first` residual of a program down as the reference of all tolerances, if it is that of the first program

@@ -29,20 +29,18 @@ pub struct Residuals {
 impl Residuals {
     /// The largest of the four; NaN if any is.
     pub fn largest(&self) -> f64 {
-        [self.equilibrium, self.gluing, self.gap, self.complementarity]
-            .into_iter()
-            .fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+        [self.equilibrium, self.gluing, self.gap, self.complementarity].into_iter().fold(0.0, larger)
     }
 }
 
-/// `a / b`, and zero where there is nothing to compare with and nothing wrong.
-fn relative(a: f64, b: f64) -> f64 {
+/// `a / b`; zero if `a` is, whatever `b`.
+pub(super) fn relative(a: f64, b: f64) -> f64 {
     if a == 0.0 { 0.0 } else { a / b }
 }
 
-/// The larger one; NaN if the value is.
-fn at_least(bound: f64, value: f64) -> f64 {
-    if bound > value { bound } else { value }
+/// The larger one; NaN if any is.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if b.is_nan() || b > a { b } else { a }
 }
 
 impl TornProblem<'_> {
@@ -84,12 +82,12 @@ impl TornProblem<'_> {
         let [glue, gap, product, contact_force, displacement] = worst.map(|w| self.space.maximum(w));
         let force_square = squares[1].max(squares[2]);
         let before = &self.committed.sizes;
-        let size = at_least(before.displacement, displacement);
+        let size = larger(before.displacement, displacement);
         let residuals = Residuals {
             equilibrium: relative(squares[0].sqrt(), force_square.max(before.force_square).sqrt().max(terms)),
             gluing: relative(glue, size),
             gap: relative(gap, size),
-            complementarity: relative(product, at_least(before.contact_force, contact_force) * size),
+            complementarity: relative(product, larger(before.contact_force, contact_force) * size),
         };
         (residuals, Sizes { elastic_norm: 0.0, force_square, displacement, contact_force })
     }
@@ -168,5 +166,5 @@ pub fn largest_displacement(u: &Torn) -> f64 {
     u.iter()
         .flat_map(|local| local.chunks_exact(3))
         .map(|u| (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).sqrt())
-        .fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+        .fold(0.0, larger)
 }

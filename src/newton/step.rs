@@ -13,15 +13,15 @@ use std::sync::Arc;
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
 use super::problem::{State, TornProblem};
-use super::program::{Found, ProgramSettings, ProgramState, Programs, Warm};
+use super::program::{DualSolution, ProgramSettings, ProgramState, Programs};
 use crate::assembly::flow::{self, Flow};
 use crate::feti::Torn;
+use crate::feti::coarse::Coarse;
 use crate::feti::coarse::motion;
-use crate::feti::coarse::projector::Projector;
 use crate::feti::coarse::recover;
 use crate::feti::dual::operator::{DualOperator, Singular};
 use crate::feti::inverse::basis::Bases;
-use crate::feti::inverse::tangents::Iterate;
+use crate::feti::inverse::tangents::Linearisation;
 use crate::feti::preconditioner::Preconditioner;
 use crate::monitor::timing::Timer;
 use crate::qp::{Outcome, Statistics};
@@ -59,14 +59,14 @@ pub struct SolverState {
     pub flows: Vec<Flow>,
     /// What new factors are stored in at least.
     pub precision: Precision,
-    /// The states whose tangents the factors of each own subdomain are of.
+    /// The states that the factors of each own subdomain were made from.
     pub bases: Vec<Bases>,
 }
 
 /// What is kept from step to step: `F`, `P`, the preconditioner, the last program.
 pub struct StepSolver<'a> {
     pub(super) operator: DualOperator<'a>,
-    pub(super) projector: Projector<'a>,
+    pub(super) coarse: Coarse<'a>,
     preconditioner: Option<Preconditioner<'a>>,
     pub(super) programs: Programs,
     /// Directions of flow in each own subdomain.
@@ -77,17 +77,17 @@ impl<'a> StepSolver<'a> {
     /// On operators that are set up for the problem's subdomains; nothing is factorised before the first step.
     pub fn new(
         operator: DualOperator<'a>,
-        projector: Projector<'a>,
+        coarse: Coarse<'a>,
         preconditioner: Option<Preconditioner<'a>>,
         settings: ProgramSettings,
     ) -> Self {
-        let flows = vec![Flow::default(); operator.inverse().bases().len()];
-        Self { operator, projector, preconditioner, programs: Programs::new(settings), flows }
+        let flows = vec![Flow::default(); operator.inverse.bases().len()];
+        Self { operator, coarse, preconditioner, programs: Programs::new(settings), flows }
     }
 
     /// What the next steps depend on.
     pub fn state(&self) -> SolverState {
-        let inverse = self.operator.inverse();
+        let inverse = &self.operator.inverse;
         let (precision, bases) = (inverse.precision(), inverse.bases().to_vec());
         SolverState { programs: self.programs.state(), flows: self.flows.clone(), precision, bases }
     }
@@ -99,7 +99,7 @@ impl<'a> StepSolver<'a> {
     pub fn resume(&mut self, problem: &TornProblem, state: SolverState, timer: &Timer) -> Result<(), String> {
         let SolverState { programs, flows, precision, bases } = state;
         self.flows = flows;
-        self.programs.resume(self.projector.coarse(), programs);
+        self.programs.resume(&self.coarse, programs);
         let interiors = self.preconditioner.as_mut().map(Preconditioner::interiors);
         let outcome = self.operator.remake(&problem.regions(), (precision, bases), interiors, problem.space, timer);
         outcome.map_err(|singular| singular.to_string())
@@ -112,14 +112,14 @@ impl<'a> StepSolver<'a> {
         problem.gather.apply(&problem.unbalance(state), &mut lambda);
         problem.coupling.borrow_mut().solve(&mut lambda, |row| kept[row]);
         problem.constraints.laws().project_onto(&kept, &mut lambda);
-        self.programs.expect(self.projector.coarse(), kept);
+        self.programs.expect(&self.coarse, kept);
         lambda
     }
 
     /// Forgets the multipliers and factors of a solve that failed.
     pub fn forget(&mut self) {
         self.programs.forget();
-        self.operator.inverse_mut().forget();
+        self.operator.inverse.forget();
     }
 
     /// Another solve follows, from what is committed now. Its tolerances refer to its first residual if that is larger than
@@ -127,17 +127,17 @@ impl<'a> StepSolver<'a> {
     pub fn begin(&mut self) {
         self.programs.begin();
         self.flows.fill(Flow::default());
-        self.operator.inverse_mut().begin();
+        self.operator.inverse.begin();
     }
 
     /// From now on factorises in double precision; false if that was so before.
     pub fn sharpen(&mut self) -> bool {
-        self.operator.inverse_mut().sharpen()
+        self.operator.inverse.sharpen()
     }
 
     /// How far one step of a linear problem may reduce the gradient.
     pub fn linear_drop(&self) -> f64 {
-        match self.operator.inverse().precision() {
+        match self.operator.inverse.precision() {
             Precision::Single => TIGHTEST,
             Precision::Double => 0.0,
         }
@@ -177,23 +177,26 @@ impl<'a> StepSolver<'a> {
         // f_k and c_k (9), less what pinned supports move.
         let slack = problem.slack(u);
         let (mut forces, mut open) = (problem.unbalance(state), slack.clone());
-        let pinned = self.operator.pinned(problem.constraints);
-        let lifted = pinned.map(|pinned| pinned.lift(&mut forces, &mut open));
+        let lifted = self.operator.lift(problem.constraints, &mut forces, &mut open);
 
         // lambda (14), from multipliers with G lambda = e and the residual d - F lambda there.
-        let warm = self.start(problem, &forces, last, timer);
+        let (resultants, lambda) = timer.time("coarse problem", || {
+            let e = recover::resultants(problem.subdomains, problem.modes, &self.coarse, &forces);
+            let lambda = self.programs.start(&self.coarse, last, &e);
+            (e, lambda)
+        });
         let mut residual = vec![0.0; slack.len()];
-        self.respond(&warm.lambda, &mut forces.clone(), &mut residual, timer);
+        self.respond(&lambda, &mut forces.clone(), &mut residual, timer);
         residual.iter_mut().zip(&open).for_each(|(r, c)| *r -= c);
         let dual = Dual {
             operator: &mut self.operator,
-            projector: &self.projector,
+            coarse: &self.coarse,
             preconditioner: self.preconditioner.as_mut(),
             space: problem.space,
             timer,
             alive: &|applications| alive(applications - before),
         };
-        let found = self.programs.solve(problem, dual, warm, residual, forcing);
+        let found = self.programs.solve(problem, dual, &resultants, (lambda, residual), forcing);
         let mut found = found.map_err(|floating| floating.to_string())?;
 
         // du = K^+ (f_k - B'lambda) + R alpha.
@@ -208,7 +211,7 @@ impl<'a> StepSolver<'a> {
             preconditioner.close(problem.constraints, &slack, face.kept(), &mut recovered.du, timer);
         }
         let Recovered { du, local_residual, refined } = recovered;
-        let Found { lambda, outcome, statistics, at_floor, .. } = found;
+        let DualSolution { lambda, outcome, statistics, at_floor, .. } = found;
         let applications = self.operator.applications() - before + refined;
         Ok(Step { du, lambda, outcome, statistics, at_floor, local_residual, applications, factorisations })
     }
@@ -223,23 +226,14 @@ impl<'a> StepSolver<'a> {
         timer: &Timer,
     ) -> Result<usize, Singular> {
         let Self { operator, preconditioner, flows, .. } = self;
-        let iterate = Iterate { regions: &problem.regions(), u, yielding: &state.yielding, flows };
+        let at = Linearisation { regions: &problem.regions(), u, yielding: &state.yielding, flows };
         let interiors = preconditioner.as_mut().map(Preconditioner::interiors);
-        let changes = operator.update(&iterate, left, interiors, problem.space, timer)?;
+        let changes = operator.update(&at, left, interiors, problem.space, timer)?;
         if let Some(preconditioner) = preconditioner {
             let TornProblem { subdomains, constraints, space, .. } = problem;
             preconditioner.update(operator, &changes, subdomains, constraints, space, timer)?;
         }
         Ok(changes.fresh.into_iter().filter(|fresh| *fresh).count())
-    }
-
-    /// `e = R'f_k`, and multipliers next to the `last` ones with `G lambda = e`. Collective.
-    fn start(&self, problem: &TornProblem, forces: &Torn, last: &[f64], timer: &Timer) -> Warm {
-        timer.time("coarse problem", || {
-            let coarse = self.projector.coarse();
-            let resultants = recover::resultants(problem.subdomains, problem.modes, coarse, forces);
-            self.programs.start(&self.projector, last, resultants)
-        })
     }
 
     /// `du` from the forces `f_k` and the multipliers that were `found`, to which it adds what the program does not see; `open` is
@@ -248,12 +242,12 @@ impl<'a> StepSolver<'a> {
         &mut self,
         problem: &TornProblem,
         (forces, open): (&Torn, &[f64]),
-        found: &mut Found,
+        found: &mut DualSolution,
         wanted: f64,
         timer: &Timer,
     ) -> Recovered {
         let constraints = problem.constraints;
-        let Found { lambda, balanced, .. } = found;
+        let DualSolution { lambda, balanced, .. } = found;
 
         // K^+ (f_k - B'lambda), by the multipliers that are in balance, and what rounding leaves of K du = f_k - B'lambda.
         let (mut du, mut defect) = (forces.clone(), vec![0.0; open.len()]);
@@ -261,11 +255,10 @@ impl<'a> StepSolver<'a> {
         self.operator.add_hidden(constraints, (forces, &du), [lambda, balanced]);
         let mut local = forces.clone();
         problem.gather.add_transpose(-1.0, balanced, &mut local);
-        let (local_residual, refined) = timer.time("refinement", || {
-            self.operator.inverse_mut().refine(&|x| problem.space.norm(x), (&local, &mut du), wanted)
-        });
+        let (local_residual, refined) = timer
+            .time("refinement", || self.operator.inverse.refine(&|x| problem.space.norm(x), (&local, &mut du), wanted));
         if refined > 0 {
-            self.operator.inverse_mut().rejoin(&mut du);
+            self.operator.inverse.rejoin(&mut du);
             self.operator.add_hidden(constraints, (forces, &du), [lambda, balanced]);
             problem.gather.apply(&du, &mut defect);
         }
@@ -273,7 +266,7 @@ impl<'a> StepSolver<'a> {
         // R alpha, from B du - c_k in the rows that are kept.
         defect.iter_mut().zip(open).for_each(|(d, c)| *d -= c);
         if let Some(face) = self.programs.face() {
-            let coarse = self.projector.coarse();
+            let coarse = &self.coarse;
             let back = timer.time("coarse problem", || motion::amplitudes(face, coarse, problem.space, &defect));
             recover::add_rigid_motion(problem.subdomains, problem.modes, coarse, -1.0, &back, &mut du);
         }
@@ -283,7 +276,7 @@ impl<'a> StepSolver<'a> {
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.
     fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64], timer: &Timer) {
         timer.time("dual operator", || self.operator.respond(x, torn, y));
-        timer.count("dual operator", 0.0, self.operator.bytes_per_apply());
+        timer.count("dual operator", 0.0, self.operator.inverse.bytes_per_solve());
     }
 }
 

@@ -57,8 +57,8 @@ pub struct Solution {
     pub first_norm: f64,
 }
 
-/// Where to start.
-pub struct Start {
+/// Where to start, with a guess of the set.
+pub struct Guess {
     /// The unknowns.
     pub x: Vec<f64>,
     /// `d - A x`.
@@ -71,8 +71,8 @@ pub struct Start {
 
 /// Solves the problem. Give `limits` a reference at a warm start: the default is the first residual, which is too small
 /// there.
-pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Start, limits: &Limits) -> Solution {
-    let Start { x, residual, kept, uneven } = start;
+pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Guess, limits: &Limits) -> Solution {
+    let Guess { x, residual, kept, uneven } = start;
     let n = x.len();
     let mut run = Run {
         space,
@@ -202,9 +202,9 @@ impl Run<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dense::{Plain, distance, dot};
     use super::super::power;
-    use super::super::torn::{Torn, homogenised};
+    use super::super::tests::dense::{Plain, distance, dot};
+    use super::super::tests::torn::{Torn, homogenised};
     use super::*;
 
     const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
@@ -213,7 +213,7 @@ mod tests {
         let bounded = torn.bounded.clone();
         assert!(torn.restrict(&mut kept));
         let residual = torn.f.times(&x).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();
-        solve(&Plain, torn, &bounded, Start { x, residual, kept, uneven: false }, limits)
+        solve(&Plain, torn, &bounded, Guess { x, residual, kept, uneven: false }, limits)
     }
 
     #[test]

@@ -23,9 +23,7 @@ pub mod smalse;
 mod penalty;
 
 #[cfg(test)]
-mod dense;
-#[cfg(test)]
-mod torn;
+mod tests;
 
 use serde::{Deserialize, Serialize};
 
@@ -72,15 +70,6 @@ impl std::ops::AddAssign for Statistics {
         self.proportionings += other.proportionings;
         self.hessian += other.hessian;
         self.preconditioner += other.preconditioner;
-    }
-}
-
-impl std::ops::Add for Statistics {
-    type Output = Self;
-
-    fn add(mut self, other: Self) -> Self {
-        self += other;
-        self
     }
 }
 

@@ -70,15 +70,6 @@ pub struct Norms {
     pub defect: f64,
 }
 
-/// Inner products of the parts of a gradient, of the defect, and of phi with the last `H p`.
-struct Squares {
-    free: f64,
-    chopped: f64,
-    reduced_free: f64,
-    defect: f64,
-    free_hp: f64,
-}
-
 /// The cost along a direction p: p'H p, p'g, and the longest step in the set.
 struct Line {
     curvature: f64,
@@ -135,10 +126,11 @@ impl<'a> Mprgp<'a> {
         let mut last: Option<f64> = None;
         loop {
             // Stopping tests, by the projected gradient phi + beta.
-            let Squares { free, chopped, reduced_free, defect, free_hp } = self.measure(point);
-            if ![free, chopped, reduced_free, defect, free_hp].iter().all(|v| v.is_finite()) {
+            let squares = self.measure(point);
+            if !squares.iter().all(|v| v.is_finite()) {
                 return Outcome::NotFinite;
             }
+            let [free, chopped, reduced_free, defect, free_hp] = squares;
             if stop(Norms { gradient: (free + chopped).sqrt(), defect: defect.sqrt() }) {
                 return Outcome::Converged;
             }
@@ -181,14 +173,15 @@ impl<'a> Mprgp<'a> {
         }
     }
 
-    /// Splits the gradient at the point, and measures its parts. One collective.
-    fn measure(&mut self, point: &Point) -> Squares {
+    /// Splits the gradient at the point; returns phi'phi, beta'beta, phi~'phi, the square of the defect, and phi'H p with the last
+    /// `H p`. One collective.
+    fn measure(&mut self, point: &Point) -> [f64; 5] {
         self.set.split(&point.x, &point.gradient, FIXED_STEP / self.norm, &mut self.parts);
         let Parts { free, chopped, reduced } = &self.parts;
         let defect = &point.defect;
         let d =
             self.space.dots(&[(free, free), (chopped, chopped), (reduced, free), (defect, defect), (free, &self.hp)]);
-        Squares { free: d[0], chopped: d[1], reduced_free: d[2], defect: d[3], free_hp: d[4] }
+        [d[0], d[1], d[2], d[3], d[4]]
     }
 
     /// The cost along the direction p, by one product with H; `None` if something is not finite.

@@ -4,13 +4,15 @@
 //! joins, columns that would turn negative leave. At the end the residual r = b - A x has A'r <= 0 and x'A'r = 0. So if r is
 //! not zero no nonnegative x reaches b, and r shows why: b'r = |r|^2 > 0, but no column goes along r (Farkas).
 
+use super::axpy;
 use crate::vector::{dot, length};
+
 /// Share of |b| that a unit column must have along the residual to join, and share of a column that must be new.
 const ROUNDING: f64 = 1e-12;
 
 /// What was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Solution {
+pub struct Shares {
     /// The unknowns, not negative.
     pub x: Vec<f64>,
     /// `b - A x`.
@@ -18,7 +20,7 @@ pub struct Solution {
 }
 
 /// Solves the problem for the columns of A, each as long as b.
-pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
+pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Shares {
     let norms: Vec<f64> = columns.iter().map(length).collect();
     let threshold = ROUNDING * length(b);
     let mut x = vec![0.0; columns.len()];
@@ -34,12 +36,12 @@ pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
         if join(columns, b, new, &mut joined, &mut x) {
             barred.fill(false);
             residual.copy_from_slice(b);
-            joined.iter().for_each(|&k| subtract(&mut residual, x[k], &columns[k]));
+            joined.iter().for_each(|&k| axpy(-x[k], &columns[k], &mut residual));
         } else {
             barred[new] = true;
         }
     }
-    Solution { x, residual }
+    Shares { x, residual }
 }
 
 /// The `y` of the smallest norm with `row . y <= bound` for all rows, or `None` if there is none.
@@ -55,7 +57,7 @@ pub fn least_distance(rows: &[Vec<f64>], bounds: &[f64]) -> Option<Vec<f64>> {
     let columns: Vec<Vec<f64>> = rows.iter().zip(bounds).map(column).collect();
     let mut target = vec![0.0; n + 1];
     target[n] = 1.0;
-    let Solution { residual, .. } = solve(&columns, &target);
+    let Shares { residual, .. } = solve(&columns, &target);
     let last = residual[n];
     (length(&residual) > FEASIBLE).then(|| residual[..n].iter().map(|r| -scale * r / last).collect())
 }
@@ -98,7 +100,7 @@ fn least_squares(columns: &[Vec<f64>], chosen: &[usize], b: &[f64]) -> Option<Ve
         for _ in 0..2 {
             for (direction, share) in directions.iter().zip(&mut shares) {
                 let along = dot(direction, &rest);
-                subtract(&mut rest, along, direction);
+                axpy(-along, direction, &mut rest);
                 *share += along;
             }
         }
@@ -121,10 +123,6 @@ fn least_squares(columns: &[Vec<f64>], chosen: &[usize], b: &[f64]) -> Option<Ve
     Some(x)
 }
 
-fn subtract(x: &mut [f64], factor: f64, y: &[f64]) {
-    x.iter_mut().zip(y).for_each(|(x, y)| *x -= factor * y);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -143,7 +141,7 @@ mod tests {
             let chosen: Vec<usize> = (0..columns.len()).filter(|k| set >> k & 1 == 1).collect();
             let Some(x) = least_squares(columns, &chosen, b).filter(|x| x.iter().all(|x| *x >= 0.0)) else { continue };
             let mut residual = b.to_vec();
-            chosen.iter().zip(x).for_each(|(&k, x)| subtract(&mut residual, x, &columns[k]));
+            chosen.iter().zip(x).for_each(|(&k, x)| axpy(-x, &columns[k], &mut residual));
             best = best.min(length(&residual));
         }
         best
@@ -158,7 +156,7 @@ mod tests {
             columns[5] = columns[2].clone();
             columns[6] = vec![0.0; 4];
             columns[7] = columns[0].iter().zip(&columns[1]).map(|(a, b)| a + b).collect();
-            let Solution { x, residual } = solve(&columns, &b);
+            let Shares { x, residual } = solve(&columns, &b);
             assert!((length(&residual) - enumerated(&columns, &b)).abs() < 1e-9, "{seed}");
             for (x, column) in x.iter().zip(&columns) {
                 let along = dot(column, &residual);

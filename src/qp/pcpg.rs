@@ -158,20 +158,15 @@ impl<'a> Pcpg<'a> {
         } else {
             z.copy_from_slice(r);
         }
-        self.orthogonalise(&mut z);
-        z
-    }
-
-    /// Takes the kept directions out of `z`, in the A-inner product.
-    fn orthogonalise(&self, z: &mut [f64]) {
-        let pairs: Vec<_> = self.kept.iter().map(|d| (&*z, &d.ap[..])).collect();
+        let pairs: Vec<_> = self.kept.iter().map(|d| (&z[..], &d.ap[..])).collect();
         if pairs.is_empty() {
-            return;
+            return z;
         }
         let coefficients = self.space.dots(&pairs);
         for (d, c) in self.kept.iter().zip(coefficients) {
-            axpy(-c / d.curvature, &d.p, z);
+            axpy(-c / d.curvature, &d.p, &mut z);
         }
+        z
     }
 
     fn keep(&mut self, direction: Direction) {
@@ -186,17 +181,14 @@ impl<'a> Pcpg<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dense::{Matrix, Null, Plain, Random, distance, dot, enumerate, function};
-    use super::super::quadratic::{Joined, Operator};
+    use super::super::tests::dense::{Joined, Matrix, Null, Plain, Random, distance, dot, enumerate};
     use super::*;
 
     const LIMITS: Limits = Limits { relative: 1e-10, reference: None, absolute: 0.0, drop: 0.0, products: 1000 };
 
     fn run(a: &mut Matrix, null: &mut Null, m: Option<&mut Matrix>, b: &[f64], x: &mut [f64]) -> Report {
         let mut residual: Vec<f64> = a.times(x).iter().zip(b).map(|(ax, b)| b - ax).collect();
-        let preconditioner = m.map(|m| m as &mut dyn Operator);
-        let mut function = Joined { operator: a, projection: null, preconditioner };
-        let report = Pcpg::new(&Plain).solve(&mut function, x, &mut residual, &LIMITS);
+        let report = Pcpg::new(&Plain).solve(&mut Joined(a, null, m), x, &mut residual, &LIMITS);
         let ax = a.times(x);
         let recomputed: Vec<f64> = b.iter().zip(&ax).map(|(b, ax)| b - ax).collect();
         assert!(report.outcome != Outcome::Converged || distance(&recomputed, &residual) < 1e-10);
@@ -230,7 +222,7 @@ mod tests {
         assert!((dot(&null.rows[0], &x) - before).abs() < 1e-12);
         let mut residual: Vec<f64> = a.times(&x).iter().zip(&b).map(|(ax, b)| b - ax).collect();
         let limits = Limits { reference: Some(first.first_norm), relative: 1e-9, ..LIMITS };
-        let again = Pcpg::new(&Plain).solve(&mut function(&mut a, &mut null), &mut x, &mut residual, &limits);
+        let again = Pcpg::new(&Plain).solve(&mut Joined(&mut a, &mut null, None), &mut x, &mut residual, &limits);
         assert_eq!((again.outcome, again.statistics.hessian), (Outcome::Converged, 0));
     }
 
@@ -260,7 +252,7 @@ mod tests {
         let (mut x, mut residual, mut products) = (vec![0.0; n], b.clone(), 0);
         for relative in [1e-1, 1e-3, 1e-10] {
             let limits = Limits { relative, reference: Some(5.0), ..LIMITS };
-            let report = solver.solve(&mut function(&mut a, &mut null), &mut x, &mut residual, &limits);
+            let report = solver.solve(&mut Joined(&mut a, &mut null, None), &mut x, &mut residual, &limits);
             products += report.statistics.hessian;
         }
         let mut y = vec![0.0; n];
@@ -279,7 +271,7 @@ mod tests {
         let mut residual = b.clone();
         let limits = Limits { relative: 1e-6, ..LIMITS };
         let mut null = Null::default();
-        let report = Pcpg::new(&Plain).solve(&mut function(&mut a, &mut null), &mut x, &mut residual, &limits);
+        let report = Pcpg::new(&Plain).solve(&mut Joined(&mut a, &mut null, None), &mut x, &mut residual, &limits);
         assert_eq!(report.outcome, Outcome::Converged);
         assert!(report.statistics.hessian <= 2 * n, "{report:?}");
         assert!(distance(&a.times(&x), &b) < 1e-5 * dot(&b, &b).sqrt());
@@ -295,7 +287,7 @@ mod tests {
         a.entries[7] = f64::NAN;
         let (mut x, mut residual) = (vec![0.0; 5], b.clone());
         let mut null = Null::default();
-        let report = Pcpg::new(&Plain).solve(&mut function(&mut a, &mut null), &mut x, &mut residual, &LIMITS);
+        let report = Pcpg::new(&Plain).solve(&mut Joined(&mut a, &mut null, None), &mut x, &mut residual, &LIMITS);
         assert_eq!(report.outcome, Outcome::NotFinite);
     }
 }

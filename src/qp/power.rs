@@ -81,7 +81,7 @@ fn largest(diagonal: &[f64], coupling: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dense::{Matrix, Null, Plain, Random, function};
+    use super::super::tests::dense::{Joined, Matrix, Null, Plain, Random};
     use super::*;
 
     #[test]
@@ -98,7 +98,7 @@ mod tests {
             let n = 60;
             let (mut a, norm_exact) = (Matrix::with_condition(n, cond, &mut random), 1.0);
             let start = random.vector(n);
-            let found = norm(&Plain, &mut function(&mut a, &mut Null::default()), &start).expect("an estimate");
+            let found = norm(&Plain, &mut Joined(&mut a, &mut Null::default(), None), &start).expect("an estimate");
             assert!(found.norm > 0.9 * norm_exact && found.norm < norm_exact * (1.0 + 1e-10), "{found:?}");
             assert_eq!(found.products, a.products);
             assert!(found.products <= STEPS);
@@ -109,8 +109,8 @@ mod tests {
     fn nothing_to_estimate_from() {
         let mut random = Random::new(2);
         let mut a = Matrix::with_condition(4, 10.0, &mut random);
-        assert_eq!(norm(&Plain, &mut function(&mut a, &mut Null::default()), &[0.0; 4]), None);
+        assert_eq!(norm(&Plain, &mut Joined(&mut a, &mut Null::default(), None), &[0.0; 4]), None);
         a.entries[5] = f64::NAN;
-        assert_eq!(norm(&Plain, &mut function(&mut a, &mut Null::default()), &[1.0; 4]), None);
+        assert_eq!(norm(&Plain, &mut Joined(&mut a, &mut Null::default(), None), &[1.0; 4]), None);
     }
 }

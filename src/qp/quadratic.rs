@@ -22,14 +22,12 @@ pub trait Space {
     }
 }
 
-/// A symmetric positive semidefinite matrix known by its products.
-pub trait Operator {
+/// A quadratic function on the null space of the equality constraints `G x = 0`: its symmetric positive semidefinite matrix A, the
+/// orthogonal projector P onto that space and, if there is one, a preconditioner M.
+pub trait Quadratic {
     /// `y = A x`.
     fn apply(&mut self, x: &[f64], y: &mut [f64]);
-}
 
-/// The orthogonal projector onto the null space of the equality constraints `G x = 0`.
-pub trait Projection {
     /// `x = P x`, in place.
     fn project(&mut self, x: &mut [f64]);
 
@@ -50,51 +48,8 @@ pub trait Projection {
         let mut products = space.dots(&all);
         (products.remove(0), products)
     }
-}
 
-/// All that a solver with equality constraints asks of its function: A, P and, if there is one, a preconditioner M.
-pub trait Quadratic: Operator + Projection {
     /// `z = M r` with M an approximate inverse of A, symmetric and positive on Ker G; returns false, and leaves `z`
     /// alone, if there is none.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool;
-}
-
-/// A [`Quadratic`] put together from its parts.
-pub struct Joined<'a> {
-    /// A.
-    pub operator: &'a mut dyn Operator,
-    /// P.
-    pub projection: &'a mut dyn Projection,
-    /// M.
-    pub preconditioner: Option<&'a mut dyn Operator>,
-}
-
-impl Operator for Joined<'_> {
-    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        self.operator.apply(x, y);
-    }
-}
-
-impl Projection for Joined<'_> {
-    fn project(&mut self, x: &mut [f64]) {
-        self.projection.project(x);
-    }
-
-    fn project_with_products(
-        &mut self,
-        space: &dyn Space,
-        x: &mut [f64],
-        against: &[&[f64]],
-        pairs: &[(&[f64], &[f64])],
-    ) -> (f64, Vec<f64>) {
-        self.projection.project_with_products(space, x, against, pairs)
-    }
-}
-
-impl Quadratic for Joined<'_> {
-    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
-        let Some(m) = self.preconditioner.as_deref_mut() else { return false };
-        m.apply(r, z);
-        true
-    }
 }

@@ -14,7 +14,6 @@ use crate::contact::ContactPair;
 use crate::decomposition::Cut;
 use crate::decomposition::{BodyMesh, Subdomain, bricks};
 use crate::feti::Torn;
-use crate::material::Material;
 use crate::mesh::Brick;
 use crate::model::Discrete;
 use crate::model::discrete::cut;
@@ -36,15 +35,26 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
     newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect() }
 }
 
-/// Which boxes of a finer mesh are likely to yield, from where a solved scene does; see `discretise_expecting`. `None` if
+/// Which boxes of each body of a finer mesh (x fastest) are likely to yield: those around the coarse elements that yield. `None` if
 /// the mesh is not cut into boxes. Collective.
 pub fn expected_yielding(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<Vec<bool>>> {
     let bodies = meshes::bricks(fine)?;
     let Cut::Bricks(cells) = cut(&fine.decomposition.method, &bodies) else { return None };
     let (coarse, solved) = coarse;
-    let material = |s: &Subdomain| &coarse.materials[s.material];
-    let coarse = (&coarse.bodies[..], &coarse.decomposition.subdomains[..], &solved.u);
-    Some(yielding(comm, coarse, material, (&bodies, cells)))
+    let mut found = HashSet::new();
+    for (subdomain, u) in coarse.decomposition.subdomains.iter().zip(&solved.u) {
+        let (body, brick) = (subdomain.body, brick(&coarse.bodies[subdomain.body]));
+        for nodes in internal::yielding(&Region::virgin(subdomain, &coarse.materials[subdomain.material]), u) {
+            let sum = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>();
+            let centre = |a: usize| sum(a) / nodes.len() as f64;
+            let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);
+            found.insert([body as u64, bricks::around(&bodies[body], cells, place) as u64]);
+        }
+    }
+    let mut result: Vec<Vec<bool>> = bodies.iter().map(|body| vec![false; bricks::count(body, cells)]).collect();
+    let found: Vec<u64> = found.into_iter().flatten().collect();
+    all_gather_u64(comm, &found).chunks_exact(2).for_each(|at| result[at[0] as usize][at[1] as usize] = true);
+    Some(result)
 }
 
 /// Displacement of the coarse mesh at the nodes of own fine subdomains. Copies of a node get the same bits, on any
@@ -134,32 +144,6 @@ fn closed_contacts(
         coarse_first + coarse.node(place)
     };
     fine_pairs.iter().map(|pair| closed.contains(&(pair.contact, nearest(pair.slave)))).collect()
-}
-
-/// Which boxes of `cells` cells of each finer body (x fastest) are likely to yield: those around the coarse elements that
-/// yield. Collective.
-fn yielding<'a>(
-    comm: &dyn Comm,
-    coarse: (&[BodyMesh], &[Subdomain], &Torn),
-    material: impl Fn(&Subdomain) -> &'a Material,
-    fine: (&[BodyMesh], [usize; 3]),
-) -> Vec<Vec<bool>> {
-    let (coarse_bodies, subdomains, u) = coarse;
-    let (bodies, cells) = fine;
-    let mut found = HashSet::new();
-    for (subdomain, u) in subdomains.iter().zip(u) {
-        let (body, brick) = (subdomain.body, brick(&coarse_bodies[subdomain.body]));
-        for nodes in internal::yielding(&Region::virgin(subdomain, material(subdomain)), u) {
-            let sum = |a: usize| nodes.iter().map(|&n| subdomain.points[n as usize][a]).sum::<f64>();
-            let centre = |a: usize| sum(a) / nodes.len() as f64;
-            let place = std::array::from_fn(|a| (centre(a) - brick.origin[a]) / brick.size[a]);
-            found.insert([body as u64, bricks::around(&bodies[body], cells, place) as u64]);
-        }
-    }
-    let mut result: Vec<Vec<bool>> = bodies.iter().map(|body| vec![false; bricks::count(body, cells)]).collect();
-    let found: Vec<u64> = found.into_iter().flatten().collect();
-    all_gather_u64(comm, &found).chunks_exact(2).for_each(|at| result[at[0] as usize][at[1] as usize] = true);
-    result
 }
 
 #[cfg(test)]

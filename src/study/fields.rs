@@ -5,6 +5,7 @@ use crate::assembly::internal;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::model::contacts::Contacts;
+use crate::newton::residuals::larger;
 use crate::newton::{Iterate, Newton, TornProblem};
 use crate::results::piece::{Field, Piece};
 
@@ -35,13 +36,13 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
     piece
 }
 
-/// Adds the iterate to the mesh, at the time of its increment; returns the largest von Mises stress in this rank's elements. `contact` holds
-/// the pairs whose rows are here.
+/// Adds the iterate to the mesh, at the time of its increment; `contact` holds the pairs whose rows are on this rank. Returns the
+/// largest von Mises stress in this rank's elements.
 pub fn record(piece: &mut Piece, newton: &Newton, touching: &Contacts, contact: &[ContactState]) -> f64 {
     let (problem, Iterate { u, errors, .. }) = (newton.problem(), newton.iterate());
     let displacement: Vec<[f64; 3]> = u.iter().flat_map(|u| u.as_chunks::<3>().0).copied().collect();
     let (stress, plastic): (Vec<f64>, _) = element_states(problem, u).unzip();
-    let largest = stress.iter().fold(0.0, |a: f64, &b| if b.is_nan() || b > a { b } else { a });
+    let largest = stress.iter().copied().fold(0.0, larger);
     let mut point_data = vec![Field::vector("displacement", &displacement)];
     point_data.extend(contact::fields(problem.subdomains, touching, contact));
     let estimate = match errors {

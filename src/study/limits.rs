@@ -184,7 +184,7 @@ fn displacements(comm: &dyn Comm, discrete: &Discrete, u: &Torn) -> HashMap<u64,
     found
 }
 
-/// Share of what bodies are strained by that the rounding of coordinates is; contacts alone see it.
+/// The rounding of coordinates over the largest stretch of a body. It matters to contacts only.
 fn rounding(scene: &Scene, discrete: &Discrete, of_bodies: &[Worst]) -> Option<Extreme> {
     let coordinates = discrete.extents.iter().flatten().flatten();
     let farthest = coordinates.fold(0.0_f64, |farthest, x| farthest.max(x.abs()));

@@ -119,7 +119,7 @@ pub(super) fn summarise(
     scene: &Scene,
     discrete: &Discrete,
     steps: &[(usize, StepRecord)],
-    failure: Option<&(At, newton::Outcome)>,
+    failure: &Option<(At, newton::Outcome)>,
     rows: Vec<StepRow>,
     comm: &dyn Comm,
 ) -> Summary {
@@ -150,7 +150,7 @@ pub(super) fn summarise(
             preconditioner_applications: total(|s| s.statistics.preconditioner),
             factorisations: total(|s| s.factorisations),
         },
-        error: failure.and_then(message),
+        error: failure.as_ref().and_then(message),
         newton: steps.iter().map(|(increment, record)| newton_row(*increment, record)).collect(),
         warnings: limits::warnings(scene, &rows),
         steps: rows,

@@ -3,7 +3,6 @@
 use crate::comm::Comm;
 use crate::decomposition::twins::{alike, twins};
 use crate::feti::Interconnection;
-use crate::feti::coarse::projector::Projector;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::analyse;
@@ -58,7 +57,7 @@ pub(super) fn step_solver<'a>(
     let pinnable = pinnable::unknowns(constraints, subdomains, modes);
     let inverse = Inverse::new(symbolic, precision, hybrid, twins(comm, subdomains), pinnable);
     let operator = DualOperator::new(inverse, gather);
-    Ok(StepSolver::new(operator, Projector::new(coarse), preconditioner, programs(scene)))
+    Ok(StepSolver::new(operator, coarse, preconditioner, programs(scene)))
 }
 
 /// How the quadratic programs are solved.

@@ -1,6 +1,8 @@
 //! Rigid motions of whole bodies: three translations, three rotations about the centre of the body's bounding box in units
-//! of its half diagonal. Pieces of a body that have no face in common count as bodies, here. With `T_c` their share of the modes of cluster `c`, a row's force on a body is `T' G` of it,
-//! in which gluing cancels.
+//! of its half diagonal. Pieces of a body that have no face in common count as bodies here.
+//!
+//! `T_c` expresses the motions of a body in the modes of its cluster `c`. The force of a row on a body is `T'G` of that row; forces
+//! of gluing cancel there.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -88,7 +90,8 @@ impl BodyMotions {
         self.clusters.iter().flat_map(of).collect()
     }
 
-    /// Motions, orthonormal, that meet no resistance in `T' blocks T`, of the lower blocks of `G G'` for some unit rows.
+    /// An orthonormal basis of the kernel of `T' blocks T`: the motions that some rows leave free. `blocks` are the lower ones of
+    /// `G G'` for these rows as unit vectors.
     pub fn free(&self, blocks: &Blocks) -> Vec<Vec<f64>> {
         let n = MODES * self.bodies();
         let mut gram = vec![vec![0.0; n]; n];

@@ -135,7 +135,8 @@ pub(super) fn without(square: f64, e: &[f64], a: &[f64]) -> f64 {
 /// Forces along a free motion smaller than this share of all are rounding.
 const BALANCED: f64 = 1e-10;
 
-/// Adds `C C'` to the blocks. Of `N` the rows of each body are taken in the size of what holds it; `C'N` stays regular.
+/// Adds `C C'` to the blocks. The rows of `N` at a body are scaled by the root of the largest entry of its block, so that `C'N` stays
+/// regular.
 fn tied(motions: &BodyMotions, free: &[Vec<f64>], mut blocks: Blocks) -> Blocks {
     let first = motions.first_clusters();
     let largest = |x: &[f64]| x.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));

@@ -1,7 +1,7 @@
 //! Sparse Cholesky factors of `G G'`, whole on every rank.
 //!
-//! Each set of rows has a factor of its own. A set of some rows has no block that the set of all rows has not: all are
-//! factorised in the pattern of the latter, which is ordered and analysed once.
+//! Each set of rows has a factor of its own. Every block of some rows is a block of all rows too. So all sets are factorised in the
+//! pattern of all rows, which is ordered and analysed once.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ fn adjacency(blocks: &Blocks, clusters: usize) -> (Vec<i32>, Vec<i32>) {
 }
 
 /// Where `G G'` has blocks, and the elimination that goes with it.
-pub struct Symbolic {
+pub struct CoarseAnalysis {
     /// The blocks by column, then row.
     places: Vec<(usize, usize)>,
     /// Lower triangle by columns.
@@ -33,7 +33,7 @@ pub struct Symbolic {
     cholesky: Analysis,
 }
 
-impl Symbolic {
+impl CoarseAnalysis {
     /// For these blocks; their values do not count.
     pub fn new(blocks: &Blocks, clusters: usize) -> Self {
         // A cluster that no row touches has a block of zeros.
@@ -61,7 +61,7 @@ impl Symbolic {
         blocks.keys().all(|&(row, column)| self.places.binary_search(&(column, row)).is_ok())
     }
 
-    /// The values of these blocks in the order of [`Symbolic::rows`]; zero where there is none.
+    /// The values of these blocks in the order of [`CoarseAnalysis::rows`]; zero where there is none.
     fn values(&self, blocks: &Blocks) -> Vec<f64> {
         let mut values = Vec::with_capacity(self.rows.len());
         for of_column in self.places.chunk_by(|a, b| a.0 == b.0) {
@@ -80,7 +80,7 @@ impl Symbolic {
 
 /// The factor for a set of rows.
 pub struct CoarseFactor {
-    symbolic: Rc<Symbolic>,
+    symbolic: Rc<CoarseAnalysis>,
     factor: Factor,
     workspace: RefCell<Workspace>,
     /// Of the entries of the matrix.
@@ -92,8 +92,8 @@ impl CoarseFactor {
     ///
     /// # Errors
     /// If they are not positive definite, the cluster where that shows.
-    pub fn new(symbolic: &Rc<Symbolic>, blocks: &Blocks) -> Result<Self, usize> {
-        let Symbolic { begins, rows, cholesky, .. } = &**symbolic;
+    pub fn new(symbolic: &Rc<CoarseAnalysis>, blocks: &Blocks) -> Result<Self, usize> {
+        let CoarseAnalysis { begins, rows, cholesky, .. } = &**symbolic;
         let (lower, values) = (Lower { column_begin: begins, rows }, symbolic.values(blocks));
         let mut workspace = Workspace::new([cholesky]);
         let mut factor = Factor::new(cholesky, Precision::Double);

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use thiserror::Error;
 
 use super::bodies::BodyMotions;
-use super::factor::{Blocks, CoarseFactor, Symbolic};
+use super::factor::{Blocks, CoarseAnalysis, CoarseFactor};
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{Constraints, Kind, Row};
 use crate::decomposition::{Clusters, Subdomain};
@@ -46,11 +46,11 @@ pub struct Coarse<'a> {
     /// `G G'` of the equalities, on every rank.
     equalities: OnceCell<Blocks>,
     motions: BodyMotions,
-    /// For each row what would make it a unit vector, squared; and whether that is not 1 for all.
+    /// One over the squared length of each row, and whether rows are of unequal length.
     unit: Vec<f64>,
     uneven: bool,
-    /// For all rows, and so for any.
-    symbolic: OnceCell<Rc<Symbolic>>,
+    /// Analysis for all rows; it fits every choice of them.
+    symbolic: OnceCell<Rc<CoarseAnalysis>>,
     /// Of all rows; present once the coarse problem is set up.
     factor: Option<CoarseFactor>,
 }
@@ -188,15 +188,15 @@ impl<'a> Coarse<'a> {
         self.factor_of(&self.blocks(&kept), || self.unit_blocks(&kept))
     }
 
-    /// The factor of blocks, which need not be those of some rows. `unit` are those of unit rows, which tell, where stiffness
-    /// jumps, whether a motion is free or only held by something soft. Collective.
+    /// The factor of blocks, which need not be those of some rows. `unit` are the blocks if all rows were unit vectors: where
+    /// stiffness jumps, they tell free motions from those that something soft holds. Collective.
     ///
     /// # Errors
     /// If they are singular: on every rank.
     pub fn factor_of(&self, blocks: &Blocks, unit: impl FnOnce() -> Blocks) -> Result<CoarseFactor, Floating> {
         let clusters = self.clusters.total();
-        let symbolic = self.symbolic.get_or_init(|| Rc::new(Symbolic::new(&self.blocks(|_| true), clusters)));
-        let fitting = if symbolic.holds(blocks) { symbolic } else { &Rc::new(Symbolic::new(blocks, clusters)) };
+        let symbolic = self.symbolic.get_or_init(|| Rc::new(CoarseAnalysis::new(&self.blocks(|_| true), clusters)));
+        let fitting = if symbolic.holds(blocks) { symbolic } else { &Rc::new(CoarseAnalysis::new(blocks, clusters)) };
         let factor = CoarseFactor::new(fitting, blocks);
         let sound = factor.and_then(|factor| {
             let checked = factor.check_rank();

@@ -1,7 +1,6 @@
 use faer::Mat;
 use faer::prelude::Solve;
 
-use super::projector::Projector;
 use crate::constraint::Kind;
 use crate::feti::inverse::kernel::MODES;
 use crate::fixture::{
@@ -77,9 +76,9 @@ fn coarse_products_and_solutions_are_the_same_bits_on_any_ranks() {
             });
         }
         same_on_any_ranks(&scene, |setup| {
-            let projector = Projector::new(setup.coarse().expect("the bodies are held"));
+            let coarse = setup.coarse().expect("the bodies are held");
             let mut rows = setup.multipliers(2);
-            projector.project(&mut rows);
+            coarse.project(&mut rows);
             setup.owned(&rows)
         });
     }

@@ -115,31 +115,17 @@ impl<'a> Gather<'a> {
 
     /// `rows = B torn`. One neighbour exchange.
     pub fn apply(&self, torn: &Torn, rows: &mut [f64]) {
-        self.collect(1, |own, slots| self.fill_slots(own, &torn[own], slots), |row, sum| rows[row] = sum[0]);
-    }
-
-    /// Adds one subdomain's part of `B u` to its slots.
-    fn fill_slots(&self, own: usize, local: &[f64], slots: &mut [f64]) {
-        for entry in &self.entries[own] {
-            slots[entry.slot as usize] += entry.value * local[entry.dof as usize];
-        }
-    }
-
-    /// Sums `width` numbers a slot over the slots of each row, in subdomain order: `fill` adds an own subdomain's
-    /// numbers, `take` receives each row's sums. One neighbour exchange.
-    pub fn collect(&self, width: usize, fill: impl Fn(usize, &mut [f64]), mut take: impl FnMut(usize, &[f64])) {
-        self.exchange(width, fill, |row, slots| {
-            let mut sum = [0.0; 8];
-            for slot in slots.chunks_exact(width) {
-                for (s, value) in sum.iter_mut().zip(slot) {
-                    *s += value;
-                }
+        let fill = |own: usize, slots: &mut [f64]| {
+            for entry in &self.entries[own] {
+                slots[entry.slot as usize] += entry.value * torn[own][entry.dof as usize];
             }
-            take(row, &sum[..width]);
-        });
+        };
+        // From zero, not by `sum`, which begins with -0.
+        self.exchange(1, fill, |row, slots| rows[row] = slots.iter().fold(0.0, |sum, slot| sum + slot));
     }
 
-    /// As [`Gather::collect`], but hands out the slots themselves: `width` numbers a slot, in subdomain order.
+    /// Lets `fill` add the numbers of each own subdomain to its slots, `width` a slot, and hands the slots of each row to `take`, in
+    /// subdomain order. One neighbour exchange.
     pub fn exchange(&self, width: usize, fill: impl Fn(usize, &mut [f64]), mut take: impl FnMut(usize, &[f64])) {
         let Buffers { slots, outgoing, incoming } = &mut *self.buffers.borrow_mut();
         let count = self.slot_begin[self.rows()] as usize;

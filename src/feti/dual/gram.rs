@@ -11,7 +11,7 @@ pub struct Gram {
     row_index: Vec<u32>,
     column_index: Vec<u32>,
     /// Unknowns of all coefficients.
-    sites: Vec<Site>,
+    sites: Vec<SlotUnknown>,
     products: Vec<Product>,
     analysis: Analysis,
     workspace: Workspace,
@@ -35,7 +35,7 @@ struct Product {
 
 /// Where a coefficient's unknown is.
 #[derive(Clone, Copy)]
-pub struct Site {
+pub struct SlotUnknown {
     /// The slot of its node.
     pub slot: u32,
     /// Component.
@@ -51,7 +51,7 @@ pub struct Coefficient {
     /// Itself.
     pub value: f64,
     /// Its unknown.
-    pub site: Site,
+    pub site: SlotUnknown,
     /// The block of `W` that it belongs to.
     block: Block,
 }
@@ -90,7 +90,7 @@ pub fn coefficients(
                 Coefficient {
                     place,
                     value: term.value,
-                    site: Site { slot: slot as u32, axis: term.axis as u32, tied },
+                    site: SlotUnknown { slot: slot as u32, axis: term.axis as u32, tied },
                     block,
                 }
             }));
@@ -161,7 +161,7 @@ impl Gram {
     }
 
     /// Factorises on the kept rows, `weight` being `W` between two unknowns of a block.
-    pub fn factorise(&mut self, weight: impl Fn(Site, Site) -> f64, kept: impl Fn(usize) -> bool) {
+    pub fn factorise(&mut self, weight: impl Fn(SlotUnknown, SlotUnknown) -> f64, kept: impl Fn(usize) -> bool) {
         self.kept.iter_mut().zip(&self.rows).for_each(|(k, &row)| *k = kept(row));
         self.values.fill(0.0);
         for Product { entry, factors, value } in &self.products {

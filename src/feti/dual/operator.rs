@@ -3,7 +3,6 @@
 use thiserror::Error;
 
 use super::gather::Gather;
-use super::pinned::Pinned;
 use super::space::RowSpace;
 use crate::assembly::Region;
 use crate::constraint::{Constraints, Kind};
@@ -13,7 +12,7 @@ use crate::feti::inverse::Inverse;
 use crate::feti::inverse::basis::Bases;
 use crate::feti::inverse::factor::NotDefinite;
 use crate::feti::inverse::schur::Schur;
-use crate::feti::inverse::tangents::Iterate;
+use crate::feti::inverse::tangents::Linearisation;
 use crate::monitor::timing::Timer;
 use crate::sparse::cholesky::Precision;
 
@@ -42,9 +41,10 @@ pub struct Changes {
 
 /// The dual operator; counts its applications.
 pub struct DualOperator<'a> {
-    inverse: Inverse,
-    gather: &'a Gather<'a>,
-    torn: Torn,
+    /// `K^+`, to be applied by itself too.
+    pub inverse: Inverse,
+    pub(super) gather: &'a Gather<'a>,
+    pub(super) torn: Torn,
     applications: usize,
 }
 
@@ -54,31 +54,21 @@ impl<'a> DualOperator<'a> {
         Self { inverse, gather, torn: gather.zeros(), applications: 0 }
     }
 
-    /// `K^+`.
-    pub fn inverse(&self) -> &Inverse {
-        &self.inverse
-    }
-
-    /// `K^+`, to be applied by itself.
-    pub fn inverse_mut(&mut self) -> &mut Inverse {
-        &mut self.inverse
-    }
-
     /// Takes over the tangents at an iterate, see [`Inverse::update`]. Collective.
     ///
     /// # Errors
     /// If one is singular.
     pub fn update(
         &mut self,
-        iterate: &Iterate,
+        at: &Linearisation,
         left: f64,
         mut interiors: Option<&mut Schur>,
         space: &RowSpace,
         timer: &Timer,
     ) -> Result<Changes, Singular> {
-        let fresh = agree(self.inverse.update(iterate, left, interiors.as_deref_mut(), timer), space)?;
+        let fresh = agree(self.inverse.update(at, left, interiors.as_deref_mut(), timer), space)?;
         if self.inverse.is_hybrid() {
-            let loose = self.inverse.update_clusters(timer).err().map(|own| iterate.regions[own].subdomain.id);
+            let loose = self.inverse.update_clusters(timer).err().map(|own| at.regions[own].subdomain.id);
             space.lowest(loose).map_or(Ok(()), |subdomain| Err(Singular::Cluster { subdomain }))?;
         }
         let is_weak = |own| interiors.as_ref().is_some_and(|schur| schur.is_weak(own));
@@ -119,11 +109,6 @@ impl<'a> DualOperator<'a> {
         agree(self.inverse.strengthen(subdomains, beside, is_any_weak, interiors, timer), space)
     }
 
-    /// The subdomains with unknowns that are kept at zero; `None` if no rank has any.
-    pub fn pinned<'s>(&'s self, constraints: &'s Constraints) -> Option<Pinned<'s>> {
-        self.inverse.pins().then(|| Pinned::new(&self.inverse, constraints, self.gather))
-    }
-
     /// Adds to multipliers, which balance each cluster, what balances each of its members: the forces by which these held each
     /// other in the last [`Inverse::solve`] or [`Inverse::rejoin`]. One neighbour exchange with clusters, none without.
     pub fn add_bonds<const N: usize>(&self, constraints: &Constraints, multipliers: [&mut Vec<f64>; N]) {
@@ -139,13 +124,11 @@ impl<'a> DualOperator<'a> {
         }
     }
 
-    /// Adds to multipliers what no quadratic program sees: [`DualOperator::add_bonds`] and [`Pinned::add_reactions`], after the
-    /// displacement `du` under `forces`. The last of the multipliers are in balance.
+    /// Adds to multipliers what no quadratic program sees: what holds the members of clusters together, and what
+    /// pinned supports carry, after the displacement `du` under `forces`. The last of the multipliers are in balance.
     pub fn add_hidden(&self, constraints: &Constraints, at: (&Torn, &Torn), [lambda, balanced]: [&mut Vec<f64>; 2]) {
         self.add_bonds(constraints, [&mut *lambda, &mut *balanced]);
-        if let Some(pinned) = self.pinned(constraints) {
-            pinned.add_reactions(at, [lambda, balanced]);
-        }
+        self.add_reactions(constraints, at, [lambda, balanced]);
     }
 
     /// `y = F x`. One neighbour exchange.
@@ -170,11 +153,6 @@ impl<'a> DualOperator<'a> {
     /// Applications of F so far.
     pub fn applications(&self) -> usize {
         self.applications
-    }
-
-    /// Bytes of factors that one application reads.
-    pub fn bytes_per_apply(&self) -> f64 {
-        self.inverse.bytes_per_solve()
     }
 }
 

@@ -4,35 +4,26 @@
 //! The factor of such a subdomain keeps these unknowns at zero. Prescribed displacements there are a lift `w` that is known, and the
 //! rest is solved for with `f - K w`. The supports carry what equilibrium of the pinned unknowns leaves: `f - B'lambda - K du`.
 
+use super::operator::DualOperator;
 use crate::constraint::{Constraints, Kind};
 use crate::feti::Torn;
-use crate::feti::dual::gather::Gather;
-use crate::feti::inverse::Inverse;
 
-/// Own subdomains with pinned unknowns, and their rows.
-pub struct Pinned<'s> {
-    inverse: &'s Inverse,
-    constraints: &'s Constraints,
-    gather: &'s Gather<'s>,
-}
-
-impl<'s> Pinned<'s> {
-    /// Those of an inverse as it was updated last.
-    pub fn new(inverse: &'s Inverse, constraints: &'s Constraints, gather: &'s Gather<'s>) -> Self {
-        Self { inverse, constraints, gather }
+impl DualOperator<'_> {
+    /// Own subdomains with pinned unknowns.
+    fn pinned(&self) -> impl Iterator<Item = usize> {
+        (0..self.torn.len()).filter(|&own| !self.inverse.pinned(own).is_empty())
     }
 
-    fn subdomains(&self) -> impl Iterator<Item = usize> {
-        (0..self.constraints.entries.len()).filter(|&own| !self.inverse.pinned(own).is_empty())
-    }
-
-    /// `w`, a displacement that closes the `slack` of supports in these subdomains and is zero elsewhere. Subtracts `K w` from the
-    /// forces and `B w` from the slack. One neighbour exchange.
-    pub fn lift(&self, forces: &mut Torn, slack: &mut [f64]) -> Torn {
+    /// `w`, a displacement that closes the `slack` of supports in subdomains with pinned unknowns and is zero elsewhere; `None` if
+    /// no rank has any. Subtracts `K w` from the forces and `B w` from the slack. One neighbour exchange.
+    pub fn lift(&self, constraints: &Constraints, forces: &mut Torn, slack: &mut [f64]) -> Option<Torn> {
+        if !self.inverse.pins() {
+            return None;
+        }
         let mut lifted = self.gather.zeros();
-        for own in self.subdomains() {
+        for own in self.pinned() {
             for entry in self.gather.entries(own) {
-                let row = &self.constraints.rows[entry.row as usize];
+                let row = &constraints.rows[entry.row as usize];
                 if matches!(row.kind, Kind::Support { .. }) {
                     let sum: f64 = row.terms.iter().map(|term| term.value).sum();
                     lifted[own][entry.dof as usize] = slack[entry.row as usize] / sum;
@@ -43,23 +34,31 @@ impl<'s> Pinned<'s> {
         let mut closed = vec![0.0; slack.len()];
         self.gather.apply(&lifted, &mut closed);
         slack.iter_mut().zip(closed).for_each(|(slack, closed)| *slack -= closed);
-        lifted
+        Some(lifted)
     }
 
-    /// Adds to multipliers what supports carry in these subdomains, `forces - B'lambda - K du` at pinned unknowns with the last of
-    /// the multipliers, which are in balance. One neighbour exchange.
-    pub fn add_reactions<const N: usize>(&self, (forces, du): (&Torn, &Torn), multipliers: [&mut Vec<f64>; N]) {
+    /// Adds to multipliers what supports carry in subdomains with pinned unknowns: `forces - B'balanced - K du` there. One
+    /// neighbour exchange, none if no rank has pinned unknowns.
+    pub(super) fn add_reactions(
+        &self,
+        constraints: &Constraints,
+        (forces, du): (&Torn, &Torn),
+        [lambda, balanced]: [&mut Vec<f64>; 2],
+    ) {
+        if !self.inverse.pins() {
+            return;
+        }
         let mut left = self.gather.zeros();
-        for own in self.subdomains() {
+        for own in self.pinned() {
             let mut rest = forces[own].clone();
-            self.gather.add_transpose_one(own, -1.0, multipliers[N - 1], &mut rest);
+            self.gather.add_transpose_one(own, -1.0, balanced, &mut rest);
             self.subtract_product(own, &du[own], &mut rest);
             self.inverse.pinned(own).iter().for_each(|&dof| left[own][dof as usize] = rest[dof as usize]);
         }
         let mut carried = vec![0.0; self.gather.rows()];
         self.gather.apply(&left, &mut carried);
-        for lambda in multipliers {
-            self.constraints.add_forces(&carried, |kind| !kind.is_contact(), lambda);
+        for multipliers in [lambda, balanced] {
+            constraints.add_forces(&carried, |kind| !kind.is_contact(), multipliers);
         }
     }
 

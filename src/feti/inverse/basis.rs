@@ -1,11 +1,11 @@
-//! From which states the kept factors were made. They take little memory beside the factors, and factors can be made again from
-//! them, to the same bits: for a restart.
+//! The states that the kept factors were made from. A restart makes the factors again from these states, to the same bits. States
+//! take little memory beside factors.
 
 use std::sync::Arc;
 
 use crate::assembly::flow::Flow;
 
-/// The state whose tangent a factor is of.
+/// The state that a factor was made from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Basis {
     /// No element yields.

@@ -124,8 +124,9 @@ impl Factors {
         self.precision = precision;
     }
 
-    /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`; `common` says that it has
-    /// twins, here or on other ranks.
+    /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`; `common` says that it has twins, here
+    /// or on other ranks. If some unknowns are to be `pinned` at zero, ascending, factorises the rest of `K` instead: they must
+    /// leave no rigid motion free, see [`super::pinnable`].
     ///
     /// # Errors
     /// If the matrix is not positive definite, or not finite.
@@ -134,43 +135,7 @@ impl Factors {
         own: usize,
         subdomain: &Subdomain,
         stiffness: &[f64],
-        common: bool,
-    ) -> Result<(), NotDefinite> {
-        self.take(own, subdomain, stiffness, Vec::new(), common)
-    }
-
-    /// As [`Factors::factorise`], but keeps these unknowns at zero: factorises the rest of `K` in place of `K + rho Q`. They must
-    /// leave no rigid motion free, see [`super::pinnable`].
-    ///
-    /// # Errors
-    /// As there.
-    pub fn pin(
-        &mut self,
-        own: usize,
-        subdomain: &Subdomain,
-        stiffness: &[f64],
         pinned: &[u32],
-    ) -> Result<(), NotDefinite> {
-        self.take(own, subdomain, stiffness, pinned.to_vec(), false)
-    }
-
-    /// The least pivot of the factor of an own subdomain, relative to the diagonal entry of its `stiffness` there.
-    pub fn least_pivot(&self, own: usize, stiffness: &[f64]) -> f64 {
-        let Symbolic { pattern, cholesky, .. } = &*self.symbolic[own];
-        cholesky.least_pivot(self.factors.of(own), |dof| stiffness[pattern.column_begin[dof] as usize])
-    }
-
-    /// Unknowns of an own subdomain that its factor keeps at zero, ascending.
-    pub fn pinned(&self, own: usize) -> &[u32] {
-        &self.pinned[own]
-    }
-
-    fn take(
-        &mut self,
-        own: usize,
-        subdomain: &Subdomain,
-        stiffness: &[f64],
-        pinned: Vec<u32>,
         common: bool,
     ) -> Result<(), NotDefinite> {
         let Symbolic { pattern, fixing, cholesky, .. } = &*self.symbolic[own];
@@ -182,9 +147,9 @@ impl Factors {
         if pinned.is_empty() {
             add_fixing(pattern, fixing, &subdomain.shape, rho, &mut self.shifted);
         } else {
-            pattern.uncouple(&pinned, &mut self.shifted);
+            pattern.uncouple(pinned, &mut self.shifted);
         }
-        self.pinned[own] = pinned;
+        self.pinned[own] = pinned.to_vec();
         let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
         if !rho.is_finite() {
             return Err(refuse(0));
@@ -205,6 +170,17 @@ impl Factors {
             return outcome.map_err(|breakdown| refuse(breakdown.place));
         }
         Ok(())
+    }
+
+    /// The least pivot of the factor of an own subdomain, relative to the diagonal entry of its `stiffness` there.
+    pub fn least_pivot(&self, own: usize, stiffness: &[f64]) -> f64 {
+        let Symbolic { pattern, cholesky, .. } = &*self.symbolic[own];
+        cholesky.least_pivot(self.factors.of(own), |dof| stiffness[pattern.column_begin[dof] as usize])
+    }
+
+    /// Unknowns of an own subdomain that its factor keeps at zero, ascending.
+    pub fn pinned(&self, own: usize) -> &[u32] {
+        &self.pinned[own]
     }
 
     /// From now on an own subdomain has the factor of a congruent one with equal stiffness.

@@ -3,7 +3,7 @@
 //! [`Inverse`] is the whole: set up in [`Inverse::new`], given its numbers by [`Inverse::update`], applied by [`Inverse::solve`].
 //! [`kernel`] has the rigid modes, [`factor`] the factors of whole subdomains, [`schur`] those of their interiors with the Schur
 //! complement, [`stock`] the scratch that their solves share. [`tangents`] decides which factors are kept, shared or made
-//! again, from what they are made of ([`basis`]); [`refine`] makes up for the digits that they lack. [`pinnable`] finds unknowns
+//! again, from the states that they were made from ([`basis`]). [`refine`] recovers the digits that they lack. [`pinnable`] finds unknowns
 //! that factors may keep at zero. [`hybrid`] joins subdomains to clusters.
 //!
 //! All here is local to a rank.
@@ -24,7 +24,7 @@ use self::basis::Bases;
 use self::factor::{Factors, NotDefinite, Symbolic};
 use self::hybrid::Hybrid;
 use self::schur::Schur;
-use self::tangents::{Factorising, Iterate, Tangents};
+use self::tangents::{Factorising, Linearisation, Tangents};
 use super::Torn;
 use crate::assembly::Region;
 use crate::decomposition::Subdomain;
@@ -65,13 +65,13 @@ impl Inverse {
     /// The first tangent that is singular. Those behind it keep their factors.
     pub fn update(
         &mut self,
-        iterate: &Iterate,
+        at: &Linearisation,
         left: f64,
         interiors: Option<&mut Schur>,
         timer: &Timer,
     ) -> Result<Vec<bool>, NotDefinite> {
         self.pins = false;
-        self.tangents.update(iterate, left, &mut Factorising { factors: &mut self.factors, schur: interiors, timer })
+        self.tangents.update(at, left, &mut Factorising { factors: &mut self.factors, schur: interiors, timer })
     }
 
     /// Makes the clusters follow the factors of their members.
@@ -83,7 +83,7 @@ impl Inverse {
         timer.time("clusters", || hybrid.update(&mut self.factors))
     }
 
-    /// Makes factors again from what they were made of, to the same bits, in at least this precision.
+    /// Makes factors again from their former states, to the same bits, in at least this precision.
     ///
     /// # Errors
     /// The first tangent that is singular. Those behind it have no factors.
@@ -128,19 +128,19 @@ impl Inverse {
 
     /// Another solve follows, from what is committed now.
     pub fn begin(&mut self) {
-        self.tangents.commit();
+        self.tangents.bases.iter_mut().for_each(Bases::commit);
     }
 
     /// The next update makes all factors anew.
     pub fn forget(&mut self) {
-        self.tangents.drop_factors();
+        self.tangents.bases.iter_mut().for_each(|bases| bases.factor = None);
     }
 
     /// From now on factorises in double precision, and the next update makes all factors anew; false if that was so before.
     pub fn sharpen(&mut self) -> bool {
         let before = self.factors.precision();
         self.factors.set_precision(Precision::Double);
-        self.tangents.drop_factors();
+        self.forget();
         before == Precision::Single
     }
 
@@ -159,7 +159,7 @@ impl Inverse {
 
     /// Refines `x = K^+ r` of each subdomain by itself, see [`refine::refine`].
     pub fn refine(&mut self, norm: &dyn Fn(&Torn) -> f64, at: (&Torn, &mut Torn), share: f64) -> (f64, usize) {
-        refine::refine(&mut self.factors, self.tangents.values(), norm, at, share)
+        refine::refine(&mut self.factors, &self.tangents.values, norm, at, share)
     }
 
     /// Closes the bonds of clusters in a displacement, see [`Hybrid::rejoin`].
@@ -189,7 +189,7 @@ impl Inverse {
 
     /// Analysis and lower values of an own subdomain's tangent as it was factorised last.
     pub fn stiffness(&self, own: usize) -> (&Symbolic, &[f64]) {
-        (self.factors.symbolic(own), &self.tangents.values()[own])
+        (self.factors.symbolic(own), &self.tangents.values[own])
     }
 
     /// What new factors are stored in at least.
@@ -197,9 +197,9 @@ impl Inverse {
         self.factors.precision()
     }
 
-    /// What the factors of each own subdomain are of.
+    /// The states that the factors of each own subdomain were made from.
     pub fn bases(&self) -> &[Bases] {
-        self.tangents.bases()
+        &self.tangents.bases
     }
 
     /// Bytes of factors that one [`Inverse::solve`] reads.

@@ -1,4 +1,4 @@
-//! What `K^+` is worth: the residual of the subdomains' problems `K x = r`, and iterative refinement where it is too large.
+//! Iterative refinement of `x = K^+ r`, where the residual of the subdomains' problems `K x = r` is too large.
 //!
 //! Factors are in single precision where a probe lets them be, and matrices near incompressibility or collapse have large
 //! condition numbers. The multipliers hide that, as they are found with the same factors; the forces that a step leaves out of

@@ -31,9 +31,9 @@ pub(super) struct Factorising<'s> {
     pub timer: &'s Timer,
 }
 
-/// A Newton iterate `u_k`, by what its tangent depends on.
+/// What the tangents `K_k` at a Newton iterate `u_k` depend on.
 #[derive(Clone, Copy)]
-pub struct Iterate<'s> {
+pub struct Linearisation<'s> {
     /// Own subdomains, each with its material and history.
     pub regions: &'s [Region<'s>],
     /// Torn displacement.
@@ -49,9 +49,9 @@ pub(super) struct Tangents {
     /// Congruent subdomains have the same number.
     twins: Vec<Option<usize>>,
     /// Lower values of each own subdomain's tangent.
-    values: Vec<Rc<Vec<f64>>>,
-    /// The states whose tangents its factors are of.
-    bases: Vec<Bases>,
+    pub values: Vec<Rc<Vec<f64>>>,
+    /// The states that the factors of each own subdomain were made from.
+    pub bases: Vec<Bases>,
     /// Scratch: a tangent that may be worth factorising.
     assembled: Vec<f64>,
 }
@@ -61,26 +61,6 @@ impl Tangents {
     pub fn new(twins: Vec<Option<usize>>) -> Self {
         let (values, bases) = (vec![Rc::default(); twins.len()], vec![Bases::default(); twins.len()]);
         Self { twins, values, bases, assembled: Vec::new() }
-    }
-
-    /// Lower values of each own subdomain's tangent.
-    pub fn values(&self) -> &[Rc<Vec<f64>>] {
-        &self.values
-    }
-
-    /// The states whose tangents the factors of each own subdomain are of.
-    pub fn bases(&self) -> &[Bases] {
-        &self.bases
-    }
-
-    /// Another state is committed now.
-    pub fn commit(&mut self) {
-        self.bases.iter_mut().for_each(Bases::commit);
-    }
-
-    /// All factors are to be made anew.
-    pub fn drop_factors(&mut self) {
-        self.bases.iter_mut().for_each(|bases| bases.factor = None);
     }
 
     /// Makes factors again, to the same bits. Local.
@@ -115,7 +95,7 @@ impl Tangents {
             let common = twin && bases.is_elastic();
             let values = Rc::new(tangent(&regions[own], own, basis, on.factors));
             self.values[own] = Rc::clone(&values);
-            on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common))?;
+            on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, &[], common))?;
         }
         let Some(basis) = &bases.interior else { return Ok(()) };
         if on.schur.is_none() || self.bases[own].interior.as_ref() == Some(basis) {
@@ -137,7 +117,7 @@ impl Tangents {
     /// The first tangent that is singular; those behind it are not looked at.
     pub fn update(
         &mut self,
-        &Iterate { regions, u, yielding, flows }: &Iterate,
+        &Linearisation { regions, u, yielding, flows }: &Linearisation,
         left: f64,
         on: &mut Factorising,
     ) -> Result<Vec<bool>, NotDefinite> {
@@ -192,7 +172,7 @@ impl Tangents {
         self.bases[own].factor = Some(basis.clone());
         let values = Rc::new(self.assembled.clone());
         self.values[own] = Rc::clone(&values);
-        let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common));
+        let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, &[], common));
         on.timer.count("factorisation", on.factors.symbolic(own).analysis().flops(), 0.0);
         outcome?;
         // Where a body has become soft but for its volume, the entries of the volume hide it; the pivots do not.
@@ -233,10 +213,7 @@ impl Tangents {
             return Ok(());
         }
         let values = &self.values[own];
-        on.timer.time("factorisation", || match pinned {
-            [] => on.factors.factorise(own, subdomain, values, false),
-            pinned => on.factors.pin(own, subdomain, values, pinned),
-        })
+        on.timer.time("factorisation", || on.factors.factorise(own, subdomain, values, pinned, false))
     }
 
     /// Gives an elastic subdomain what an elastic twin has already; `None` if there is none.
@@ -275,7 +252,7 @@ impl Tangents {
     }
 }
 
-/// Lower values of the tangent that a factor is of.
+/// Lower values of the tangent at the state that a factor is made from.
 fn tangent(region: &Region, own: usize, basis: &Basis, factors: &Factors) -> Vec<f64> {
     let pattern = &factors.symbolic(own).pattern;
     let mut values = vec![0.0; pattern.rows.len()];

@@ -27,7 +27,7 @@ use crate::sparse::submatrix::Submatrix;
 /// The faces of one rank's subdomains.
 pub struct Deluxe<'a> {
     comm: &'a dyn Comm,
-    faces: Vec<Face>,
+    faces: Vec<GluedFace>,
     analyses: Vec<Analysed>,
     /// Whether any rank has a face with deluxe scaling.
     active: bool,
@@ -41,7 +41,7 @@ struct Analysed {
 }
 
 /// The components of nodes that one row of gluing between two subdomains touches, and no other row.
-struct Face {
+struct GluedFace {
     rows: Vec<u32>,
     /// Coefficient of each row on the first side; it is the opposite on the other.
     values: Vec<f64>,
@@ -95,9 +95,9 @@ impl<'a> Deluxe<'a> {
         let face = |(pair, rows): ([u32; 2], Vec<u32>)| {
             let sides = pair.map(|subdomain| side(subdomain as usize, &rows));
             let values = rows.iter().map(|&row| constraints.rows[row as usize].terms[0].value).collect();
-            Face { rows, values, sides, share: None }
+            GluedFace { rows, values, sides, share: None }
         };
-        let is_own = |face: &Face| face.sides.iter().any(|side| side.own.is_some());
+        let is_own = |face: &GluedFace| face.sides.iter().any(|side| side.own.is_some());
         let faces = rows_of.into_iter().map(face).filter(is_own).collect();
         Self { comm, faces, analyses: Vec::new(), active: false }
     }
@@ -105,7 +105,7 @@ impl<'a> Deluxe<'a> {
     /// Whether an own subdomain is weak or shares a face with one that is, given which of all subdomains are.
     pub fn is_beside(&self, own: usize, weak: &[bool]) -> bool {
         let is_own = |side: &FaceSide| side.own.as_ref().is_some_and(|side| side.own == own);
-        let is_scaled = |face: &&Face| face.sides.iter().any(|side| weak[side.subdomain]);
+        let is_scaled = |face: &&GluedFace| face.sides.iter().any(|side| weak[side.subdomain]);
         self.faces.iter().filter(is_scaled).any(|face| face.sides.iter().any(is_own))
     }
 
@@ -190,12 +190,12 @@ impl<'a> Deluxe<'a> {
         }
     }
 
-    fn scaled(&self) -> impl Iterator<Item = (&Face, &Mat<f64>)> {
+    fn scaled(&self) -> impl Iterator<Item = (&GluedFace, &Mat<f64>)> {
         self.faces.iter().filter_map(|face| face.share.as_ref().map(|share| (face, share)))
     }
 }
 
-impl Face {
+impl GluedFace {
     /// The sides of own subdomains, numbered.
     fn own_sides(&self) -> impl Iterator<Item = (usize, &OwnSide)> {
         self.sides.iter().enumerate().filter_map(|(number, side)| side.own.as_ref().map(|own| (number, own)))

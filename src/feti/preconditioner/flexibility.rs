@@ -9,7 +9,7 @@ use faer::{Mat, Side};
 use crate::constraint::ties::Group;
 use crate::constraint::{Constraints, Term};
 use crate::feti::dual::gather::Gather;
-use crate::feti::dual::gram::Site;
+use crate::feti::dual::gram::SlotUnknown;
 use crate::sparse::pattern::Pattern;
 
 /// A group that gives way so many times as easily as its nodes alone is not held by the others: its nodes count alone.
@@ -61,7 +61,7 @@ impl Flexibility {
         result
     }
 
-    /// Brings to each slot what is its node's.
+    /// Brings the flexibility of its node to each slot.
     fn exchange(&mut self, constraints: &Constraints, gather: &Gather, tied: &[Vec<Tied>]) {
         let slots = constraints.slot_subdomain.len();
         self.of_slot = vec![[0.0; 3]; slots];
@@ -122,7 +122,7 @@ impl Flexibility {
     }
 
     /// How a unit force at one unknown moves another, which is the same or tied to it.
-    pub fn between(&self, a: Site, b: Site) -> f64 {
+    pub fn between(&self, a: SlotUnknown, b: SlotUnknown) -> f64 {
         match b.tied {
             Some(place) => {
                 let line = self.line_of_slot[a.slot as usize] + a.axis;

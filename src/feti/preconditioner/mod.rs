@@ -87,7 +87,7 @@ impl<'a> Preconditioner<'a> {
         timer: &Timer,
     ) -> Result<(), Singular> {
         let Changes { fresh, weak } = changes;
-        let stiffness = (0..subdomains.len()).map(|own| operator.inverse().stiffness(own));
+        let stiffness = (0..subdomains.len()).map(|own| operator.inverse.stiffness(own));
         let stiffness = stiffness.map(|(symbolic, values)| (&symbolic.pattern, values));
         self.scaling = timer.time("scaling", || Scaling::new(constraints, self.gather, stiffness));
         let is_any_weak = weak.contains(&true);
@@ -96,7 +96,7 @@ impl<'a> Preconditioner<'a> {
         }
         let beside: Vec<usize> = (0..subdomains.len()).filter(|&own| self.deluxe.is_beside(own, weak)).collect();
         operator.strengthen(subdomains, (&beside, is_any_weak), &mut self.schur, space, timer)?;
-        let stiffness = |own: usize| operator.inverse().stiffness(own);
+        let stiffness = |own: usize| operator.inverse.stiffness(own);
         timer.time("faces", || self.deluxe.update(weak, fresh, &self.schur, stiffness));
         Ok(())
     }

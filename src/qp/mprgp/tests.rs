@@ -1,6 +1,5 @@
 use super::*;
-use crate::qp::dense::{Matrix, Null, Plain, Random, distance, dot, enumerate};
-use crate::qp::quadratic::Operator;
+use crate::qp::tests::dense::{Matrix, Null, Plain, Random, distance, dot, enumerate};
 
 /// No equality constraints.
 struct Alone<'a>(&'a mut Matrix, Option<&'a mut Matrix>);

@@ -1,6 +1,5 @@
 use super::*;
-use crate::qp::dense::{Matrix, Null, Plain, Random, distance, dot, enumerate};
-use crate::qp::quadratic::{Joined, Operator, Projection};
+use crate::qp::tests::dense::{Joined, Matrix, Null, Plain, Random, distance, dot, enumerate};
 
 const LIMITS: Limits = Limits { relative: 1e-9, reference: None, absolute: 0.0, drop: 0.0, products: 4000 };
 const NONE: f64 = f64::NEG_INFINITY;
@@ -39,11 +38,7 @@ impl Case {
         self.settings.limits.reference = Some(dot(&size, &size).sqrt());
         let problem = Problem {
             space: &Plain,
-            function: &mut Joined {
-                operator: &mut self.a,
-                projection: &mut self.null,
-                preconditioner: preconditioner.map(|m| m as &mut dyn Operator),
-            },
+            function: &mut Joined(&mut self.a, &mut self.null, preconditioner),
             b: &self.b,
             set: &self.set,
         };

@@ -53,7 +53,7 @@ fn k_times_its_generalised_inverse_times_k_is_k() {
                     let mut values = vec![0.0; factors.symbolic(own).pattern.rows.len()];
                     let region = Region::virgin(subdomain, &MATERIAL);
                     stiffness::assemble(&region, (&u, &[]), &factors.symbolic(own).pattern, &mut values);
-                    factors.factorise(own, subdomain, &values, false).expect("stiff up to rigid motions");
+                    factors.factorise(own, subdomain, &values, &[], false).expect("stiff up to rigid motions");
                     let times = |factors: &Factors, x: &[f64]| {
                         let mut y = vec![0.0; x.len()];
                         factors.symbolic(own).pattern.multiply_add(&values, x, &mut y);
@@ -110,7 +110,7 @@ fn a_stiffness_that_is_not_finite_or_not_definite_is_refused_by_name() {
             for at in [0, 1, stiffnesses[2].len() - 1, stiffnesses[2].len() - 2] {
                 let mut values = stiffnesses[2].clone();
                 values[at] = spoilt;
-                let error = factors.factorise(2, subdomain, &values, false).expect_err("it is spoilt");
+                let error = factors.factorise(2, subdomain, &values, &[], false).expect_err("it is spoilt");
                 assert_eq!((error.subdomain, error.dofs), (2, subdomain.dofs()));
             }
         }
@@ -148,7 +148,7 @@ fn twins_get_what_they_would_get_alone_and_the_same_bits_beside_any_others() {
                     if common && (1..twins).contains(&own) {
                         factors.share(own, 0);
                     } else {
-                        factors.factorise(own, subdomain, &values, common).expect("definite");
+                        factors.factorise(own, subdomain, &values, &[], common).expect("definite");
                     }
                 }
                 let mut x = given.clone();
@@ -175,7 +175,9 @@ fn pinned_unknowns_stay_and_the_others_give_way_as_without_them() {
         let mut forces = setup.displacements(3);
         let before = forces.clone();
         let own = (0..pinned.len()).find(|&own| !pinned[own].is_empty()).expect("a support holds a part");
-        factors.pin(own, &setup.subdomains()[own], &stiffnesses[own], &pinned[own]).expect("nothing is free");
+        factors
+            .factorise(own, &setup.subdomains()[own], &stiffnesses[own], &pinned[own], false)
+            .expect("nothing is free");
         assert_eq!(factors.pinned(own), pinned[own]);
         factors.solve(&mut forces);
         let k = dense(&factors.symbolic(own).pattern, &stiffnesses[own]);
@@ -185,7 +187,9 @@ fn pinned_unknowns_stay_and_the_others_give_way_as_without_them() {
         assert_close(&Mat::from_fn(rest.len(), 1, |i, _| forces[own][rest[i]]), &moved, 1e-10);
         assert!(pinned[own].iter().all(|&dof| forces[own][dof as usize] == 0.0));
 
-        factors.factorise(own, &setup.subdomains()[own], &stiffnesses[own], false).expect("elastic bodies are stiff");
+        factors
+            .factorise(own, &setup.subdomains()[own], &stiffnesses[own], &[], false)
+            .expect("elastic bodies are stiff");
         let mut again = before.clone();
         factors.solve(&mut again);
         let mut plain = before;

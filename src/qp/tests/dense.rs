@@ -1,6 +1,6 @@
 //! For tests: dense matrices, a projector by Gram-Schmidt, random numbers, and the truth by trying all active sets.
 
-use super::quadratic::{Joined, Operator, Projection, Space};
+use crate::qp::quadratic::{Quadratic, Space};
 pub use crate::vector::dot;
 
 /// Plain inner products.
@@ -100,10 +100,9 @@ impl Matrix {
     pub fn times(&self, x: &[f64]) -> Vec<f64> {
         self.entries.chunks_exact(self.n).map(|row| dot(row, x)).collect()
     }
-}
 
-impl Operator for Matrix {
-    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+    /// `y = A x`, counted.
+    pub fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.products += 1;
         y.copy_from_slice(&self.times(x));
     }
@@ -119,10 +118,8 @@ impl Null {
     pub fn of(rows: Vec<Vec<f64>>) -> Self {
         Self { rows: gram_schmidt(rows) }
     }
-}
 
-impl Projection for Null {
-    fn project(&mut self, x: &mut [f64]) {
+    pub fn project(&mut self, x: &mut [f64]) {
         for row in &self.rows {
             let c = dot(row, &*x);
             x.iter_mut().zip(row).for_each(|(x, r)| *x -= c * r);
@@ -130,9 +127,21 @@ impl Projection for Null {
     }
 }
 
-/// A quadratic function without preconditioner.
-pub fn function<'a>(a: &'a mut Matrix, null: &'a mut Null) -> Joined<'a> {
-    Joined { operator: a, projection: null, preconditioner: None }
+/// A quadratic function put together from A, P and, perhaps, M.
+pub struct Joined<'a>(pub &'a mut Matrix, pub &'a mut Null, pub Option<&'a mut Matrix>);
+
+impl Quadratic for Joined<'_> {
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.0.apply(x, y);
+    }
+
+    fn project(&mut self, x: &mut [f64]) {
+        self.1.project(x);
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
+        self.2.as_mut().map(|m| m.apply(r, z)).is_some()
+    }
 }
 
 pub fn distance(x: &[f64], y: &[f64]) -> f64 {

@@ -1,13 +1,13 @@
 //! For tests: the dual problem of a torn membrane with an obstacle, small and dense, but with all that Total-FETI has:
 //! floating parts, orthonormal gluing rows, support rows, contact rows, a coarse right-hand side.
 
-use super::active_set::Face;
 use super::dense::{Matrix, Plain, dot};
-use super::feasible::FeasibleSet;
-use super::mprgp::Expansion;
-use super::quadratic::{Operator, Projection, Quadratic};
-use super::smalse::{Problem, Settings, Solution, Start, solve};
-use super::{Limits, axpy, power};
+use crate::qp::active_set::Face;
+use crate::qp::feasible::FeasibleSet;
+use crate::qp::mprgp::Expansion;
+use crate::qp::quadratic::Quadratic;
+use crate::qp::smalse::{Problem, Settings, Solution, Start, solve};
+use crate::qp::{Limits, axpy, power};
 
 /// One equality, on the kept rows and on all rows, with its right-hand side.
 #[derive(Clone)]
@@ -139,22 +139,18 @@ impl Rows {
     }
 }
 
-impl Operator for Torn {
+impl Quadratic for Torn {
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.f.apply(x, y);
     }
-}
 
-impl Projection for Torn {
     fn project(&mut self, x: &mut [f64]) {
         x.iter_mut().zip(&self.kept).for_each(|(x, kept)| *x *= f64::from(*kept));
         for row in &self.basis {
             axpy(-dot(&row.inside, &*x), &row.inside, x);
         }
     }
-}
 
-impl Quadratic for Torn {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         if self.preconditioned {
             self.lumped.apply(r, z);
