@@ -205,7 +205,7 @@ impl Run<'_> {
         let mut watch = Watch { run: self, plan, discrete: &discrete, monitor };
         let solved = study::solve(scene, &discrete, comm, begin, timer, &mut watch);
         match (solved, keeper.end()) {
-            (Err(StudyError::Stopped), Some(end)) => Err(end.into()),
+            (Err(StudyError::Stopped), Some(end)) => Err(end),
             (solved, _) => Ok((discrete, solved?)),
         }
     }

@@ -2,8 +2,11 @@
 
 use std::array::from_fn;
 
+use super::hex8::{self, Hex8};
 use super::point::block;
-use super::{Nodal, Point, hex8, tet4, tet10};
+use super::tet4::Tet4;
+use super::tet10::Tet10;
+use super::{Element, Nodal, Point, cell};
 use crate::material::samples::STEEL;
 use crate::material::von_mises::{PlasticState, VonMises};
 use crate::material::{Law, Variables};
@@ -15,12 +18,12 @@ const TET4: Nodal<4> = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0,
 /// Runs a check on distorted elements of every kind, of edge about 10 and far from the origin.
 macro_rules! on_all {
     ($check:ident) => {
-        shapes(TET4).for_each(|nodes| $check(nodes, tet4::points(&nodes).expect("it has a volume")));
+        shapes(TET4).for_each(|nodes| $check(nodes, Tet4::points(&nodes).expect("it has a volume")));
         shapes(TET4)
             .map(|corners| bent(&corners))
-            .for_each(|nodes| $check(nodes, tet10::points(&nodes).expect("it has a volume")));
+            .for_each(|nodes| $check(nodes, Tet10::points(&nodes).expect("it has a volume")));
         let cube = hex8::CORNERS.map(|x| x.map(|x| 0.5 * x));
-        shapes(cube).for_each(|nodes| $check(nodes, hex8::points(&nodes).expect("it has a volume")));
+        shapes(cube).for_each(|nodes| $check(nodes, Hex8::points(&nodes).expect("it has a volume")));
     };
 }
 
@@ -41,7 +44,7 @@ fn bent(corners: &Nodal<4>) -> Nodal<10> {
         let shift: [f64; 3] = random.vector(0.5);
         std::array::from_fn(|i| 0.5 * (corners[a][i] + corners[b][i]) + shift[i])
     };
-    let middles = tet10::EDGES.map(&mut middle);
+    let middles = cell::EDGES.map(&mut middle);
     std::array::from_fn(|a| if a < 4 { corners[a] } else { middles[a - 4] })
 }
 

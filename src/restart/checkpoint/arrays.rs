@@ -17,7 +17,7 @@ use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::basis::{Bases, Basis};
-use crate::material::{Variable, history};
+use crate::material::history;
 use crate::model::Discrete;
 use crate::newton::Snapshot;
 use crate::restart::places::key;
@@ -133,11 +133,8 @@ impl<'a> Packer<'a> {
 
     fn histories(&self) -> Vec<Field> {
         let histories = (0..self.own().len()).flat_map(|own| self.newton.committed.history(own));
-        let arrays = history::arrays(histories);
-        let field = |(of, values): (Variable, _)| {
-            Field::of(&format!("histories/{}", of.name), of.components, Values::Real(values))
-        };
-        arrays.map(field).collect()
+        let field = |(name, numbers, values)| Field::of(&format!("histories/{name}"), numbers, Values::Real(values));
+        history::arrays(histories).into_iter().map(field).collect()
     }
 
     /// Directions of plastic flow: of the iterate, and of what factors are of.
