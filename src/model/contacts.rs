@@ -65,10 +65,9 @@ pub(super) fn pair(
             }
             _ => unreachable!("two sides have two surfaces"),
         };
-        pairs.iter_mut().for_each(|pair| match contact.clearance {
-            Some(clearance) => pair.set_distance(clearance),
-            None => pair.widen(contact.gap),
-        });
+        for pair in &mut pairs {
+            pair.gap = contact.clearance.unwrap_or(pair.gap + contact.gap);
+        }
         if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
             let found = sagitta::unresolved(&surfaces[slave].1, &master.1, &pairs);
             warnings.extend(found.map(|found| extent::unresolved(name, &found, pairs.len())));

@@ -6,6 +6,19 @@ use std::collections::HashMap;
 
 const SMALL: Brick = Brick { origin: [600.0, -1.0, 1000.0], size: [3.0, 5.0, 0.7], cells: [4, 3, 2] };
 
+/// What only tests ask.
+impl Brick {
+    /// Number of tetrahedra.
+    pub fn element_count(&self) -> u64 {
+        6 * self.cell_count()
+    }
+
+    /// Number of triangles on a face of the body.
+    pub fn triangle_count(&self, face: Face) -> u64 {
+        2 * self.cell_count() / self.cells[face.axis()] as u64
+    }
+}
+
 fn lower(level: usize) -> Brick {
     Brick { origin: [0.0; 3], size: [3000.0, 1000.0, 1000.0], cells: [30, 10, 10] }.refined(level)
 }
