@@ -1,6 +1,7 @@
 //! The map from a reference element, of `N` nodes and as many shape functions.
 
 use super::Nodal;
+use crate::vector::cross;
 
 /// Determinant of the map where the shape functions have these derivatives by the reference coordinates.
 #[inline]
@@ -26,9 +27,7 @@ fn jacobian<const N: usize>(nodes: &Nodal<N>, derivatives: &Nodal<N>) -> (f64, [
             (0..3).for_each(|i| edge[i] += d * (node[i] - nodes[0][i]));
         }
     }
-    let [a, b, c] = &edges;
-    let cross =
-        |u: &[f64; 3], v: &[f64; 3]| [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let [a, b, c] = edges;
     let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
     ((0..3).map(|i| a[i] * cofactors[0][i]).sum(), cofactors)
 }

@@ -77,9 +77,4 @@ pub trait Law {
 
     /// The state at the end of the step, to be committed once the load step has converged.
     fn commit(&self, strain: &Voigt, committed: &Self::State) -> Self::State;
-
-    /// [`Self::stiffness`] without a direction of flow.
-    fn tangent(&self, strain: &Voigt, committed: &Self::State) -> Tangent {
-        self.stiffness(strain, committed, None)
-    }
 }

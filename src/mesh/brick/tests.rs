@@ -19,6 +19,15 @@ impl Brick {
     }
 }
 
+impl Face {
+    /// Outward unit normal.
+    pub fn normal(self) -> [f64; 3] {
+        let mut normal = [0.0; 3];
+        normal[self.axis()] = if self.is_upper() { 1.0 } else { -1.0 };
+        normal
+    }
+}
+
 fn lower(level: usize) -> Brick {
     Brick { origin: [0.0; 3], size: [3000.0, 1000.0, 1000.0], cells: [30, 10, 10] }.refined(level)
 }
