@@ -93,7 +93,7 @@ enum Due {
     Checkpoint,
     /// A checkpoint, and then the end, for this reason.
     Stop(String),
-    /// The same, for nobody can read the log.
+    /// The same, because the log cannot be written.
     Mute,
 }
 

@@ -47,7 +47,7 @@ impl Element<8, 8> for Hex8 {
     #[inline]
     fn points(nodes: &Nodal<8>) -> Option<[Point<8>; 8]> {
         (Self::shape(nodes) > DEGENERATE).then(|| {
-            let mut points = CORNERS.map(|corner| at(nodes, &corner.map(|x| GAUSS * x)));
+            let mut points = CORNERS.map(|corner| map::point(nodes, &derivatives(&corner.map(|x| GAUSS * x))));
             let volume: f64 = points.iter().map(|point| point.weight).sum();
             let mut mean = [[0.0; 3]; 8];
             for point in &points {
@@ -91,7 +91,7 @@ impl Element<8, 8> for Hex8 {
 
     /// Without mean dilatation.
     fn sample(nodes: &Nodal<8>, at: &[f64], weight: f64) -> Sample {
-        let point = self::at(nodes, &place(at));
+        let point = map::point(nodes, &derivatives(&place(at)));
         Sample { weight: weight * point.weight, values: Self::values(at).to_vec(), gradients: point.gradients.to_vec() }
     }
 }
@@ -113,13 +113,6 @@ fn derivatives(at: &[f64; 3]) -> Nodal<8> {
         let [x, y, z] = [0, 1, 2].map(|i| 1.0 + corner[i] * at[i]);
         [0.125 * corner[0] * y * z, 0.125 * corner[1] * x * z, 0.125 * corner[2] * x * y]
     })
-}
-
-/// A point of unit weight in the reference cube, without its dilatation.
-#[inline]
-fn at(nodes: &Nodal<8>, place: &[f64; 3]) -> Point<8> {
-    let (determinant, gradients) = map::gradients(nodes, &derivatives(place));
-    Point { weight: determinant, gradients, dilatation: None }
 }
 
 const EDGES: [(usize, usize); 12] =

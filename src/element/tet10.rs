@@ -32,7 +32,7 @@ impl Element<10, 4> for Tet10 {
     fn points(nodes: &Nodal<10>) -> Option<[Point<10>; 4]> {
         (Self::shape(nodes) > DEGENERATE).then(|| {
             four_points().map(|place| {
-                let point = at(nodes, &place);
+                let point = map::point(nodes, &derivatives(&place));
                 Point { weight: point.weight / 24.0, ..point }
             })
         })
@@ -69,17 +69,10 @@ impl Element<10, 4> for Tet10 {
     }
 
     fn sample(nodes: &Nodal<10>, at: &[f64], weight: f64) -> Sample {
-        let point = self::at(nodes, &barycentric(at));
+        let point = map::point(nodes, &derivatives(&barycentric(at)));
         let values = Self::values(at).to_vec();
         Sample { weight: weight * point.weight, values, gradients: point.gradients.to_vec() }
     }
-}
-
-/// A point of unit weight in the reference tetrahedron, at barycentric coordinates.
-#[inline]
-fn at(nodes: &Nodal<10>, place: &[f64; 4]) -> Point<10> {
-    let (determinant, gradients) = map::gradients(nodes, &derivatives(place));
-    Point { weight: determinant, gradients, dilatation: None }
 }
 
 /// Derivatives of the shape functions by the barycentric coordinates of corners 1, 2, 3.

@@ -2,8 +2,8 @@
 //!
 //! A row for each integration point that has ever flowed: the first four nodes of its element, which tell elements apart,
 //! its number there, and what it remembers. Nodes count over all bodies of the scene that wrote them. So neither ranks nor
-//! subdomains matter, and bodies may be others, if only those that take their state have the same mesh. The displacement
-//! comes with it, from the last fields: equilibrium with that state does not depend on it, but is near.
+//! subdomains matter. Only the bodies that take their state need the same mesh as there. The displacement of the last fields
+//! comes with it: the equilibrium with that state does not depend on it, but is near it.
 
 use std::io::{self, ErrorKind};
 use std::ops::Range;

@@ -2,7 +2,7 @@
 //!
 //! | group | a row is |
 //! |---|---|
-//! | `subdomains` | a subdomain: how many rows it has in other groups, what its factors are of |
+//! | `subdomains` | a subdomain: its number of rows in other groups, and at what its factors were made |
 //! | `points`, `cells` | a node's copy, an element |
 //! | `rows` | a row of B that a subdomain owns |
 //! | `contacts` | a contact row, by what tells it from others on other subdomains, too |
@@ -31,7 +31,7 @@ pub(super) struct Packer<'a> {
     owned: Vec<Vec<usize>>,
     /// First own subdomain.
     first: usize,
-    /// What the factors of whole subdomains, and of their interiors, are of.
+    /// Where factors of whole subdomains, and those of their interiors, were made.
     factor: Vec<Option<Basis>>,
     interior: Vec<Option<Basis>>,
 }
@@ -137,7 +137,7 @@ impl<'a> Packer<'a> {
         history::arrays(histories).into_iter().map(field).collect()
     }
 
-    /// Directions of plastic flow: of the iterate, and of what factors are of.
+    /// Directions of plastic flow: those of the iterate, and those at which factors were made.
     fn flows(&self) -> Vec<Field> {
         let of_bases = |bases: &[Option<Basis>]| bases.iter().map(flow_of).collect();
         let (factor, interior) = (of_bases(&self.factor), of_bases(&self.interior));
