@@ -59,7 +59,7 @@ pub trait Element<const N: usize, const P: usize> {
     fn values(at: &[f64]) -> [f64; N];
 
     /// What is known at the integration points is, at a place of the cell, this combination of it.
-    fn from_points(at: &[f64]) -> [f64; P];
+    fn extrapolation(at: &[f64]) -> [f64; P];
 
     /// A place of the cell with a weight there.
     fn sample(nodes: &Nodal<N>, at: &[f64], weight: f64) -> Sample;

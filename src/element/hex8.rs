@@ -85,7 +85,7 @@ impl Element<8, 8> for Hex8 {
     }
 
     /// The integration points are the corners of a smaller cube.
-    fn from_points(at: &[f64]) -> [f64; 8] {
+    fn extrapolation(at: &[f64]) -> [f64; 8] {
         values(place(at).map(|x| 3_f64.sqrt() * x))
     }
 

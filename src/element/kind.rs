@@ -122,8 +122,8 @@ impl Kind {
     ///
     /// # Panics
     /// If the place has another number of coordinates.
-    pub fn from_points(self, at: &[f64]) -> Vec<f64> {
-        by_kind!(self, E => E::from_points(at).to_vec())
+    pub fn extrapolation(self, at: &[f64]) -> Vec<f64> {
+        by_kind!(self, E => E::extrapolation(at).to_vec())
     }
 
     /// A place of the [cell](Self::cell) of the element on these nodes, with a weight there.

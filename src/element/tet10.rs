@@ -64,7 +64,7 @@ impl Element<10, 4> for Tet10 {
         values
     }
 
-    fn from_points(at: &[f64]) -> [f64; 4] {
+    fn extrapolation(at: &[f64]) -> [f64; 4] {
         barycentric(at).map(|a| (a - FAR) / (NEAR - FAR))
     }
 

@@ -49,7 +49,7 @@ impl Element<4, 1> for Tet4 {
         barycentric(at)
     }
 
-    fn from_points(_: &[f64]) -> [f64; 1] {
+    fn extrapolation(_: &[f64]) -> [f64; 1] {
         [1.0]
     }
 

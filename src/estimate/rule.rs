@@ -42,7 +42,7 @@ fn gauss(kind: Kind, line: &[(f64, f64)]) -> Vec<Place> {
         for (y, b) in line {
             for (x, a) in line {
                 let at = [*x, *y, *z];
-                let samples = kind.from_points(&at);
+                let samples = kind.extrapolation(&at);
                 let volume = samples.iter().map(|s| a * b * c * s).collect();
                 places.push(Place { volume, samples, nodes: kind.values(&at) });
             }
@@ -53,7 +53,7 @@ fn gauss(kind: Kind, line: &[(f64, f64)]) -> Vec<Place> {
 
 /// A place that stands for this share of the volume.
 fn tetrahedron(kind: Kind, at: [f64; 4], share: f64) -> Place {
-    Place { volume: vec![share; kind.points()], samples: kind.from_points(&at), nodes: kind.values(&at) }
+    Place { volume: vec![share; kind.points()], samples: kind.extrapolation(&at), nodes: kind.values(&at) }
 }
 
 /// 14 points (Walkington, "Quadrature on simplices of arbitrary dimension", 2000).

@@ -62,10 +62,10 @@ pub trait Law {
     fn respond(&self, strain: &Voigt, committed: &Self::State) -> Response;
 
     /// The consistent tangent d stress / d strain of the same step: symmetric, at most C_e. In an elastic step it is C_e to the
-    /// last bit. With a direction of `flow`, it is the tangent of [`crate::assembly::flow`].
+    /// last bit. With a direction of `flow`, it is the tangent of `assembly::flow`.
     fn stiffness(&self, strain: &Voigt, committed: &Self::State, flow: Option<&Voigt>) -> Tangent;
 
-    /// The direction of [`crate::assembly::flow`] after a `change` of the strain by a step of a length.
+    /// The direction of flow (`assembly::flow`) after a `change` of the strain by a step of a length.
     fn flow(&self, strain: &Voigt, committed: &Self::State, flow: Option<&Voigt>, step: (&Voigt, f64)) -> Voigt;
 
     /// Psi(strain + change) - Psi(strain) - sigma(strain) : change >= 0, energy per volume: how far Psi is above its tangent. As

@@ -1,6 +1,6 @@
 //! Counts the elements of a mesh that no computation could use, before anything is computed with them.
 //!
-//! Only solvability is judged here: a small positive shape ([`Kind::shape`](crate::element::Kind::shape)) costs accuracy
+//! Only solvability is judged here: a small positive shape (`Kind::shape`) costs accuracy
 //! and is merely reported.
 
 use super::SolidMesh;

@@ -52,7 +52,7 @@ pub fn discretise(scene: &Scene, comm: &dyn Comm) -> Result<Discrete, ModelError
     discretise_expecting(scene, None, comm)
 }
 
-/// As [`discretise`], but spreads the subdomains that are expected to yield (see [`decomposition::tear`]) over the ranks.
+/// As [`discretise`], but spreads the subdomains that are expected to yield (see `decomposition::tear`) over the ranks.
 ///
 /// # Errors
 /// As there.

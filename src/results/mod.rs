@@ -1,6 +1,6 @@
 //! What a run leaves behind: the result file, the summary, and where both come from.
 //!
-//! [`vtkhdf`] writes the fields for ParaView, [`summary`] one JSON object for scripts, [`provenance`] the circumstances
+//! [`vtkhdf`] writes the fields for ParaView, `summary` one JSON object for scripts, [`provenance`] the circumstances
 //! of the run, [`checkpoint`] what it takes to go on with it. Every file is written under a temporary name and renamed when it is complete ([`replace`]);
 //! [`target`] tells files from devices and pipes. A failure on one rank is the same [`OutputError`] on all.
 //! It computes nothing: what is to be written comes in ready.

@@ -36,7 +36,7 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
     newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect() }
 }
 
-/// Which boxes of a finer mesh are likely to yield, from where a solved scene does; see [`discretise_expecting`]. `None` if
+/// Which boxes of a finer mesh are likely to yield, from where a solved scene does; see `discretise_expecting`. `None` if
 /// the mesh is not cut into boxes. Collective.
 pub fn expected_yielding(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Scene) -> Option<Vec<Vec<bool>>> {
     let bodies = meshes::bricks(fine)?;

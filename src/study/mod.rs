@@ -1,8 +1,8 @@
 //! The pipeline from a discrete problem to results: it joins the stages, and computes nothing itself.
 //!
-//! [`solve`] sets FETI up for the scene ([`solver`]), steps [`Newton`] through the history of loads, and keeps what is to be
-//! written of each increment ([`recorder`]): [`fields`], [`contact`], rows of the log and the summary ([`report`]) with the
-//! [`limits`] of the theory. [`cascade`] makes a start on a finer mesh of a solution.
+//! [`solve`] sets FETI up for the scene (`solver`), steps `Newton` through the history of loads, and keeps what is to be
+//! written of each increment (`recorder`): `fields`, [`contact`], rows of the log and the summary (`report`) with the
+//! `limits` of the theory. [`cascade`] makes a start on a finer mesh of a solution.
 
 pub mod cascade;
 pub mod contact;
@@ -120,7 +120,8 @@ pub fn solve(
 
     let failure = follow(scene, &mut newton, &mut recorder, timer, watcher)?;
 
-    let summary = summarise(scene, discrete, (newton.steps(), &failure), std::mem::take(&mut recorder.rows), comm);
+    let summary =
+        summarise(scene, discrete, newton.steps(), failure.as_ref(), std::mem::take(&mut recorder.rows), comm);
     let (problem, u) = newton.finish();
     let meshes = restart::meshes::meshes(comm, scene, discrete);
     let mesh_names = serde_json::to_string(&meshes).expect("names and numbers can be written");

@@ -118,7 +118,8 @@ pub(super) fn contact_states(problem: &TornProblem, Iterate { u, lambda, .. }: &
 pub(super) fn summarise(
     scene: &Scene,
     discrete: &Discrete,
-    (steps, failure): (&[(usize, StepRecord)], &Option<(At, newton::Outcome)>),
+    steps: &[(usize, StepRecord)],
+    failure: Option<&(At, newton::Outcome)>,
     rows: Vec<StepRow>,
     comm: &dyn Comm,
 ) -> Summary {
@@ -149,7 +150,7 @@ pub(super) fn summarise(
             preconditioner_applications: total(|s| s.statistics.preconditioner),
             factorisations: total(|s| s.factorisations),
         },
-        error: failure.as_ref().and_then(message),
+        error: failure.and_then(message),
         newton: steps.iter().map(|(increment, record)| newton_row(*increment, record)).collect(),
         warnings: limits::warnings(scene, &rows),
         steps: rows,
