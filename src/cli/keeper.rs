@@ -93,29 +93,8 @@ enum Due {
     Checkpoint,
     /// A checkpoint, and then the end, for this reason.
     Stop(String),
-    /// The same, for nobody can read the log.
+    /// The same, because the log cannot be written.
     Mute,
-}
-
-/// How a run ended before its time.
-#[derive(Clone, Debug, PartialEq)]
-pub enum End {
-    /// For a reason, with this checkpoint.
-    Stopped(String, PathBuf),
-    /// The log cannot be written; with a checkpoint if there was something to keep.
-    Mute(Option<PathBuf>),
-    /// There should be a checkpoint, but it cannot be written.
-    Lost(OutputError),
-}
-
-impl From<End> for Failure {
-    fn from(end: End) -> Self {
-        match end {
-            End::Stopped(reason, path) => Self::Stopped { reason, path },
-            End::Mute(path) => Self::Mute { path },
-            End::Lost(error) => Self::Output(error),
-        }
-    }
 }
 
 /// Decides over checkpoints, and remembers what became of them.
@@ -133,7 +112,7 @@ pub struct Keeper<'a> {
     /// How long the longest checkpoint took.
     writing: Cell<Duration>,
     /// Why the run ends here.
-    end: RefCell<Option<End>>,
+    end: RefCell<Option<Failure>>,
 }
 
 impl<'a> Keeper<'a> {
@@ -163,7 +142,7 @@ impl<'a> Keeper<'a> {
             return false;
         }
         if due == Due::Mute && is_first {
-            self.end.replace(Some(End::Mute(None)));
+            self.end.replace(Some(Failure::Mute { path: None }));
             return true;
         }
         let begin = Instant::now();
@@ -172,9 +151,9 @@ impl<'a> Keeper<'a> {
         self.asked.set(Some(Instant::now()));
         self.writing.set(self.writing.get().max(begin.elapsed()));
         let end = match (outcome, due) {
-            (Ok(()), Due::Stop(reason)) => Some(End::Stopped(reason, self.path.clone())),
-            (Ok(()), Due::Mute) => Some(End::Mute(Some(self.path.clone()))),
-            (Err(error), Due::Stop(_) | Due::Mute) => Some(End::Lost(error)),
+            (Ok(()), Due::Stop(reason)) => Some(Failure::Stopped { reason, path: self.path.clone() }),
+            (Ok(()), Due::Mute) => Some(Failure::Mute { path: Some(self.path.clone()) }),
+            (Err(error), Due::Stop(_) | Due::Mute) => Some(Failure::Output(error)),
             (Err(error), _) => {
                 warn(format!("going on without a new checkpoint: {error}"));
                 None
@@ -182,13 +161,13 @@ impl<'a> Keeper<'a> {
             (Ok(()), _) => None,
         };
         let ends = end.is_some();
-        *self.end.borrow_mut() = end;
+        self.end.replace(end);
         ends
     }
 
-    /// Why the run ended.
-    pub fn end(&self) -> Option<End> {
-        self.end.borrow().clone()
+    /// Takes the reason why the run ended before its time; `None` if it did not.
+    pub fn end(&self) -> Option<Failure> {
+        self.end.take()
     }
 
     /// Nothing is left that a checkpoint could keep.
@@ -255,9 +234,10 @@ mod tests {
                 signals.seen.store(2, Ordering::Relaxed);
             }
             assert!(keeper.pause(|_| Ok(()), |_| ()));
-            keeper.end()
+            keeper.end().map(|end| end.to_string())
         });
-        assert!(ends.into_iter().all(|end| end == Some(End::Stopped("stopped by SIGTERM".into(), "there".into()))));
+        let expected = "stopped by SIGTERM; go on with: fetiplast resume there";
+        assert!(ends.into_iter().all(|end| end.as_deref() == Some(expected)));
     }
 
     #[test]
@@ -281,7 +261,8 @@ mod tests {
         let late = keeper(options(3_600_000, 1));
         assert!(!late.pause(write, warn), "one step is done however little time there is");
         assert!(late.pause(write, warn));
-        assert_eq!(late.end(), Some(End::Stopped("stopped before the time limit".into(), "there".into())));
+        let end = late.end().expect("it has ended").to_string();
+        assert_eq!(end, "stopped before the time limit; go on with: fetiplast resume there");
     }
 
     #[test]
@@ -296,6 +277,6 @@ mod tests {
         assert!(told.take().starts_with("going on without a new checkpoint: cannot write there: full"));
         signals.seen.store(1, Ordering::Relaxed);
         assert!(pause() && told.take().is_empty());
-        assert_eq!(keeper.end(), Some(End::Lost(error)));
+        assert!(matches!(keeper.end(), Some(Failure::Output(lost)) if lost == error));
     }
 }

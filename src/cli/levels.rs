@@ -155,7 +155,7 @@ impl Run<'_> {
                     }
                     self.level(plan, &scene, coarser.take(), checkpoint.take(), monitor).map(Some)
                 }
-                // Bodies that are cut otherwise from here on may be too coarse for that here.
+                // The user has cut bodies otherwise, and this level is too coarse for that.
                 Err(error) if checkpoint.is_some() => return Err(error),
                 Err(_) => Ok(None),
             };
@@ -205,7 +205,7 @@ impl Run<'_> {
         let mut watch = Watch { run: self, plan, discrete: &discrete, monitor };
         let solved = study::solve(scene, &discrete, comm, begin, timer, &mut watch);
         match (solved, keeper.end()) {
-            (Err(StudyError::Stopped), Some(end)) => Err(end.into()),
+            (Err(StudyError::Stopped), Some(end)) => Err(end),
             (solved, _) => Ok((discrete, solved?)),
         }
     }

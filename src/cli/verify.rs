@@ -48,7 +48,8 @@ pub fn verify(arguments: &Verify, comm: &dyn Comm) -> Result<i32, Failure> {
     }
     let mut report = Report { cases: Vec::new(), passed: true };
     for case in verify::select(&arguments.cases).unwrap_or_default() {
-        tracing::info!("{}: {}", case.name(), case.about());
+        let [name, about] = case.title();
+        tracing::info!("{name}: {about}");
         let wanted =
             |element: &Kind| arguments.element.is_none_or(|only| only == *element) && !case.levels(*element).is_empty();
         if is_mute(comm) {
@@ -63,7 +64,7 @@ pub fn verify(arguments: &Verify, comm: &dyn Comm) -> Result<i32, Failure> {
             };
             let measured = verify::measure(case, element, comm, &mut tell)?;
             for verdict in measured.verdicts.iter().filter(|verdict| !verdict.met) {
-                tracing::warn!("{} {}: MISSED {}", case.name(), element.name(), verdict.text);
+                tracing::warn!("{name} {}: MISSED {}", element.name(), verdict.text);
             }
             report.passed &= measured.passed();
             report.cases.push(measured);

@@ -4,8 +4,7 @@
 //! is left of the gap `g` where supports move nodes of the condition, `scale (g - sum of weight d)`. Both are as long as the
 //! row (see [`Row::length`]). A gluing row's is zero.
 
-use super::{Constraints, Fixed, Kind, Row, Support};
-use crate::contact::ContactPair;
+use super::{Constraints, Fixed, Kind, Row};
 
 /// What supports and contacts prescribe at one time.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,12 +16,6 @@ pub struct Prescribed {
 }
 
 impl Prescribed {
-    /// As supports and pairs say themselves.
-    pub fn by(supports: &[Support], pairs: &[ContactPair]) -> Self {
-        let displacements = supports.iter().map(|support| support.displacement).collect();
-        Self { displacements, gaps: pairs.iter().map(|pair| pair.gap).collect() }
-    }
-
     /// What is left of a pair's gap where supports fix components of its condition (length).
     pub(super) fn distance(&self, pair: usize, fixed: &[Fixed]) -> f64 {
         let left = |left: f64, h: &Fixed| left - h.weight * self.displacements[h.support][h.axis];

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use super::surface::unit;
 use super::{ContactError, ContactPair};
-use crate::vector::{difference, dot};
+use crate::vector::{difference, dot, length};
 
 /// Distance of a unit vector to the others or to their span from which a direction counts as independent.
 const INDEPENDENT: f64 = 1e-6;
@@ -39,7 +39,7 @@ pub fn check(
         let free = |pair: &ContactPair| unit(std::array::from_fn(|a| if held[a] { 0.0 } else { pair.normal[a] }));
         let mut directions: Vec<[f64; 3]> = Vec::new();
         for direction in pairs.iter().filter_map(|pair| free(pair)) {
-            if directions.iter().all(|known| chord(direction, *known) > INDEPENDENT) {
+            if directions.iter().all(|known| length(difference(direction, *known)) > INDEPENDENT) {
                 directions.push(direction);
             }
         }
@@ -62,17 +62,11 @@ fn rank(directions: &[[f64; 3]]) -> usize {
             let along = dot(rest, *b);
             rest.iter_mut().zip(b).for_each(|(r, b)| *r -= along * b);
         }
-        if dot(rest, rest).sqrt() > INDEPENDENT {
+        if length(rest) > INDEPENDENT {
             basis.extend(unit(rest));
         }
     }
     basis.len()
-}
-
-/// Length between the tips of two unit vectors.
-fn chord(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let between = difference(a, b);
-    dot(between, between).sqrt()
 }
 
 #[cfg(test)]

@@ -52,16 +52,6 @@ pub struct ContactPair {
 }
 
 impl ContactPair {
-    /// Puts the other side at this distance along the normal (length).
-    pub fn set_distance(&mut self, distance: f64) {
-        self.gap = distance;
-    }
-
-    /// Moves the other side away along the normal (length).
-    pub fn widen(&mut self, distance: f64) {
-        self.gap += distance;
-    }
-
     /// Force on the slave surface where the condition is met with this force: the master's nodes take all of it.
     pub fn force(&self, force: f64) -> [f64; 3] {
         self.normal.map(|n| -force * n)

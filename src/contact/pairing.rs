@@ -128,9 +128,9 @@ mod tests {
         let expected = mortar::pair(0, "joint", &further, &other, &held).expect("they face each other");
         for (mut pair, expected) in found.pairs.into_iter().zip(expected.pairs) {
             let near = |gap: f64| (gap - expected.gap).abs() < 1e-13;
-            pair.widen(0.25);
+            pair.gap += 0.25;
             assert!(near(pair.gap));
-            pair.set_distance(0.35);
+            pair.gap = 0.35;
             assert!(near(pair.gap));
         }
     }

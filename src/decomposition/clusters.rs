@@ -16,11 +16,6 @@ pub struct Clusters {
 }
 
 impl Clusters {
-    /// Of the subdomains with these shares, one a cluster.
-    pub fn singles(subdomains: &Shares) -> Self {
-        Self { shares: subdomains.clone(), begins: (0..=subdomains.total()).collect() }
-    }
-
     /// Of so many subdomains each, spread over the ranks as `shares` say; also the shares of the subdomains.
     pub fn new(shares: Shares, sizes: &[usize]) -> (Self, Shares) {
         let mut begins = vec![0];
@@ -75,8 +70,8 @@ mod tests {
         let of_ranks = (0..3).flat_map(|rank| clusters.of_rank(rank).map(move |members| (rank, members)));
         assert!(of_ranks.eq([(0, 0..3), (0, 3..5), (2, 0..4)]));
         assert!(!clusters.are_single());
-        let singles = Clusters::singles(&Shares(vec![1, 2]));
+        let (singles, subdomains) = Clusters::new(Shares(vec![1, 2]), &[1; 3]);
         assert!(singles.are_single() && singles.total() == 3 && singles.of(2) == 2);
-        assert_eq!(singles, Clusters::new(Shares(vec![1, 2]), &[1; 3]).0);
+        assert_eq!(subdomains.0, [1, 2]);
     }
 }

@@ -6,6 +6,7 @@ use super::{Bodies, BodyMesh, Patch, Surface};
 use crate::element::Kind;
 use crate::mesh::faces::{Neighbours, key};
 use crate::mesh::{Elements, SolidMesh};
+use crate::vector::difference;
 
 /// A face on a named surface.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -113,7 +114,7 @@ impl Subdomain {
             surfaces.get(&key(&face)).cloned().unwrap_or_default()
         };
         let point = |node: u64| mesh.points[node as usize];
-        let way = |from, to| relative(point(from), point(to));
+        let way = |from, to| difference(point(to), point(from));
         let first = elements[0] as usize;
         let of = (id, body, mesh.piece(first), materials[mesh.region(first)]);
         Self::new(of, first_node, (mesh.elements.kind(), &nodes), point, way, surfaces)
@@ -159,7 +160,7 @@ impl Subdomain {
             piece,
             material,
             nodes: of_nodes,
-            shape: points.iter().map(|&point| relative(points[0], point)).collect(),
+            shape: points.iter().map(|&point| difference(point, points[0])).collect(),
             points,
             elements: Elements::new(kind, unpack_pairs(elements * kind.nodes(), &mut next)),
             facets: (0..facets)
@@ -168,10 +169,6 @@ impl Subdomain {
             boundary: unpack_pairs(boundary, &mut next),
         })
     }
-}
-
-fn relative(from: [f64; 3], to: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|a| to[a] - from[a])
 }
 
 /// Two numbers a word.

@@ -4,7 +4,8 @@ use super::subdomain::Facet;
 use super::{Bodies, BodyMesh, Counts, Cut, Patch, Shape, Subdomain, Surface, number_bodies, tear};
 use crate::comm::solo::Solo;
 use crate::comm::threads;
-use crate::element::{Kind, tet4};
+use crate::element::tet4::Tet4;
+use crate::element::{Element, Kind};
 use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis, two_meshes};
 use crate::mesh::brick::indices;
 use crate::mesh::surface::area_vector;
@@ -162,7 +163,7 @@ fn volumes_and_areas(setup: &Setup) -> [Vec<f64>; 2] {
     for subdomain in setup.subdomains() {
         let at = |nodes: &[u32]| -> Vec<_> { nodes.iter().map(|&n| subdomain.points[n as usize]).collect() };
         for tet in &subdomain.elements {
-            volumes[subdomain.body] += tet4::points(&at(tet).try_into().unwrap()).expect("it has a volume")[0].weight;
+            volumes[subdomain.body] += Tet4::points(&at(tet).try_into().unwrap()).expect("it has a volume")[0].weight;
         }
         for facet in &subdomain.facets {
             areas[facet.surface] += area_vector(&at(&facet.nodes).try_into().unwrap())[2];

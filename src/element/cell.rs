@@ -11,7 +11,7 @@ pub enum Cell {
 }
 
 /// Corners of each edge of a tetrahedron.
-pub const EDGES_OF_TETRAHEDRON: [(usize, usize); 6] = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)];
+pub const EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)];
 
 /// Coordinates of the [four points](four_points).
 pub const NEAR: f64 = 0.585_410_196_624_968_5;

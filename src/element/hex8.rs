@@ -46,15 +46,38 @@ impl Element<8, 8> for Hex8 {
 
     #[inline]
     fn points(nodes: &Nodal<8>) -> Option<[Point<8>; 8]> {
-        points(nodes)
+        (Self::shape(nodes) > DEGENERATE).then(|| {
+            let mut points = CORNERS.map(|corner| map::point(nodes, &derivatives(&corner.map(|x| GAUSS * x))));
+            let volume: f64 = points.iter().map(|point| point.weight).sum();
+            let mut mean = [[0.0; 3]; 8];
+            for point in &points {
+                for (mean, g) in mean.as_flattened_mut().iter_mut().zip(point.gradients.as_flattened()) {
+                    *mean += point.weight / volume * g;
+                }
+            }
+            for point in &mut points {
+                let gradients = &point.gradients;
+                point.dilatation = Some(std::array::from_fn(|a| std::array::from_fn(|i| mean[a][i] - gradients[a][i])));
+            }
+            points
+        })
     }
 
     fn values_at_points() -> [[f64; 8]; 8] {
         CORNERS.map(|corner| values(corner.map(|x| GAUSS * x)))
     }
 
+    /// Least volume that three edges span at a corner, over the cube of the longest edge: 1 for a cube, negative if a corner
+    /// is turned inside out. The map from the reference cube has its least determinant at a corner, or nearly so.
     fn shape(nodes: &Nodal<8>) -> f64 {
-        shape(nodes)
+        let mut longest = 0.0_f64;
+        for (a, b) in EDGES {
+            longest = longest.max((0..3).map(|i| (nodes[a][i] - nodes[b][i]).powi(2)).sum());
+        }
+        let least =
+            CORNERS.iter().map(|corner| map::determinant(nodes, &derivatives(corner))).fold(f64::INFINITY, f64::min);
+        // The reference cube has edges of two.
+        8.0 * least / (longest * longest.sqrt())
     }
 
     fn values(at: &[f64]) -> [f64; 8] {
@@ -68,7 +91,7 @@ impl Element<8, 8> for Hex8 {
 
     /// Without mean dilatation.
     fn sample(nodes: &Nodal<8>, at: &[f64], weight: f64) -> Sample {
-        let point = self::at(nodes, &place(at));
+        let point = map::point(nodes, &derivatives(&place(at)));
         Sample { weight: weight * point.weight, values: Self::values(at).to_vec(), gradients: point.gradients.to_vec() }
     }
 }
@@ -79,28 +102,8 @@ fn place(at: &[f64]) -> [f64; 3] {
 }
 
 /// Values of the shape functions at a point of the reference cube.
-pub fn values(at: [f64; 3]) -> [f64; 8] {
+fn values(at: [f64; 3]) -> [f64; 8] {
     CORNERS.map(|corner| (0..3).map(|i| 0.5 * (1.0 + corner[i] * at[i])).product())
-}
-
-/// The integration points, and `None` if the [`shape`] is [`DEGENERATE`].
-#[inline]
-pub fn points(nodes: &Nodal<8>) -> Option<[Point<8>; 8]> {
-    (shape(nodes) > DEGENERATE).then(|| {
-        let mut points = CORNERS.map(|corner| at(nodes, &corner.map(|x| GAUSS * x)));
-        let volume: f64 = points.iter().map(|point| point.weight).sum();
-        let mut mean = [[0.0; 3]; 8];
-        for point in &points {
-            for (mean, g) in mean.as_flattened_mut().iter_mut().zip(point.gradients.as_flattened()) {
-                *mean += point.weight / volume * g;
-            }
-        }
-        for point in &mut points {
-            let gradients = &point.gradients;
-            point.dilatation = Some(std::array::from_fn(|a| std::array::from_fn(|i| mean[a][i] - gradients[a][i])));
-        }
-        points
-    })
 }
 
 /// Derivatives of the shape functions by the coordinates of the reference cube.
@@ -110,26 +113,6 @@ fn derivatives(at: &[f64; 3]) -> Nodal<8> {
         let [x, y, z] = [0, 1, 2].map(|i| 1.0 + corner[i] * at[i]);
         [0.125 * corner[0] * y * z, 0.125 * corner[1] * x * z, 0.125 * corner[2] * x * y]
     })
-}
-
-/// A point of unit weight in the reference cube, without its dilatation.
-#[inline]
-pub fn at(nodes: &Nodal<8>, place: &[f64; 3]) -> Point<8> {
-    let (determinant, gradients) = map::gradients(nodes, &derivatives(place));
-    Point { weight: determinant, gradients, dilatation: None }
-}
-
-/// Least volume that three edges span at a corner, over the cube of the longest edge: 1 for a cube, negative if a corner
-/// is turned inside out. The map from the reference cube has its least determinant at a corner, or nearly so.
-pub fn shape(nodes: &Nodal<8>) -> f64 {
-    let mut longest = 0.0_f64;
-    for (a, b) in EDGES {
-        longest = longest.max((0..3).map(|i| (nodes[a][i] - nodes[b][i]).powi(2)).sum());
-    }
-    let least =
-        CORNERS.iter().map(|corner| map::determinant(nodes, &derivatives(corner))).fold(f64::INFINITY, f64::min);
-    // The reference cube has edges of two.
-    8.0 * least / (longest * longest.sqrt())
 }
 
 const EDGES: [(usize, usize); 12] =
@@ -152,9 +135,9 @@ mod tests {
     #[test]
     fn a_box_has_its_volume_and_its_shape() {
         let nodes = CORNERS.map(|[x, y, z]| [5.0 + x, 2.0 * y, 0.5 * z]);
-        let points = points(&nodes).expect("it has a volume");
+        let points = Hex8::points(&nodes).expect("it has a volume");
         assert!(points.iter().all(|p| (p.weight - 1.0).abs() < 1e-15));
-        assert!((shape(&nodes) - 8.0 / 64.0).abs() < 1e-15 && (shape(&CORNERS) - 1.0).abs() < 1e-15);
+        assert!((Hex8::shape(&nodes) - 8.0 / 64.0).abs() < 1e-15 && (Hex8::shape(&CORNERS) - 1.0).abs() < 1e-15);
     }
 
     /// By the divergence theorem over triangles, of faces that are not flat but by their mean.
@@ -172,7 +155,7 @@ mod tests {
                     exact += (0..3).map(|i| a[i] * cross[i]).sum::<f64>() / 12.0;
                 }
             }
-            let volume: f64 = points(&nodes).expect("it has a volume").iter().map(|p| p.weight).sum();
+            let volume: f64 = Hex8::points(&nodes).expect("it has a volume").iter().map(|p| p.weight).sum();
             assert!((volume - exact).abs() < 1e-13, "{volume} {exact}");
         }
     }
@@ -181,7 +164,7 @@ mod tests {
     fn the_dilatation_is_the_same_at_all_points_and_has_the_right_mean() {
         let mut random = Random::new(3);
         let nodes = distorted(&mut random);
-        let points = points(&nodes).expect("it has a volume");
+        let points = Hex8::points(&nodes).expect("it has a volume");
         let u: Nodal<8> = std::array::from_fn(|_| random.vector(1.0));
         let of_point = points.map(|point| trace(&point.strain(&u)));
         let plain = points.map(|point| trace(&Point { dilatation: None, ..point }.strain(&u)));
@@ -195,7 +178,7 @@ mod tests {
     fn b_bar_is_full_integration_for_constant_dilatation_and_softer_otherwise() {
         let c = VonMises::elastic(1.0, 0.45).hooke().tangent();
         let nodes = CORNERS.map(|[x, y, z]| [1.3 * x, 0.7 * y, z]);
-        let points = points(&nodes).expect("it has a volume");
+        let points = Hex8::points(&nodes).expect("it has a volume");
         let energy = |u: &Nodal<8>, with: bool| -> f64 {
             let strains = points.map(|p| Point { dilatation: p.dilatation.filter(|_| with), ..p }.strain(u));
             strains.iter().zip(&points).map(|(e, p)| p.weight * contract(&apply(&c, e), e)).sum()
@@ -218,9 +201,9 @@ mod tests {
         let mut folded = CORNERS;
         folded[6] = [-0.5, -0.5, 0.9];
         for nodes in [mirrored, flat, folded, [[1.0; 3]; 8]] {
-            assert_eq!(points(&nodes), None);
+            assert_eq!(Hex8::points(&nodes), None);
         }
-        assert!(points(&CORNERS.map(|x| x.map(|v| 1e-60 * v))).is_some());
+        assert!(Hex8::points(&CORNERS.map(|x| x.map(|v| 1e-60 * v))).is_some());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The map from a reference element, of `N` nodes and as many shape functions.
 
-use super::Nodal;
+use super::{Nodal, Point};
+use crate::vector::cross;
 
 /// Determinant of the map where the shape functions have these derivatives by the reference coordinates.
 #[inline]
@@ -8,12 +9,12 @@ pub fn determinant<const N: usize>(nodes: &Nodal<N>, derivatives: &Nodal<N>) -> 
     jacobian(nodes, derivatives).0
 }
 
-/// The determinant, and the gradients of the shape functions.
+/// A point of unit weight in the reference element, without dilatation.
 #[inline]
-pub fn gradients<const N: usize>(nodes: &Nodal<N>, derivatives: &Nodal<N>) -> (f64, Nodal<N>) {
+pub fn point<const N: usize>(nodes: &Nodal<N>, derivatives: &Nodal<N>) -> Point<N> {
     let (determinant, [a, b, c]) = jacobian(nodes, derivatives);
     let gradient = |d: [f64; 3]| std::array::from_fn(|i| (a[i] * d[0] + b[i] * d[1] + c[i] * d[2]) / determinant);
-    (determinant, derivatives.map(gradient))
+    Point { weight: determinant, gradients: derivatives.map(gradient), dilatation: None }
 }
 
 /// The determinant, and the cofactors: `[k][i]` over it is the derivative of reference coordinate `k` by coordinate `i`.
@@ -26,9 +27,7 @@ fn jacobian<const N: usize>(nodes: &Nodal<N>, derivatives: &Nodal<N>) -> (f64, [
             (0..3).for_each(|i| edge[i] += d * (node[i] - nodes[0][i]));
         }
     }
-    let [a, b, c] = &edges;
-    let cross =
-        |u: &[f64; 3], v: &[f64; 3]| [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let [a, b, c] = edges;
     let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
     ((0..3).map(|i| a[i] * cofactors[0][i]).sum(), cofactors)
 }

@@ -56,7 +56,7 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::{hex8, tet10};
+    use crate::element::{cell, hex8};
 
     /// Integrals over a box, or a corner of it, of a cubic monomial, and the strain of a linear field.
     #[test]
@@ -64,7 +64,7 @@ mod tests {
         let corners = hex8::CORNERS.map(|c| [1.0 + c[0], 1.5 * (1.0 + c[1]), 0.5 * (1.0 + c[2])]);
         let tet = [corners[0], corners[1], corners[3], corners[4]];
         let middle = |a: usize, b: usize| std::array::from_fn(|i| 0.5 * (tet[a][i] + tet[b][i]));
-        let middles = tet10::EDGES.map(|(a, b)| middle(a, b));
+        let middles = cell::EDGES.map(|(a, b)| middle(a, b));
         let quadratic: Vec<[f64; 3]> = tet.iter().chain(&middles).copied().collect();
         // x y z over the box is the product of squares of the edges over 8; over the corner (2 3 1)^2 1!1!1!/6!.
         let cases = [(Kind::Hex8, corners.to_vec(), 36.0 / 8.0), (Kind::Tet4, tet.to_vec(), 36.0 / 720.0)];

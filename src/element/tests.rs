@@ -2,8 +2,11 @@
 
 use std::array::from_fn;
 
+use super::hex8::{self, Hex8};
 use super::point::block;
-use super::{Nodal, Point, hex8, tet4, tet10};
+use super::tet4::Tet4;
+use super::tet10::Tet10;
+use super::{Element, Nodal, Point, cell};
 use crate::material::samples::STEEL;
 use crate::material::von_mises::{PlasticState, VonMises};
 use crate::material::{Law, Variables};
@@ -15,12 +18,12 @@ const TET4: Nodal<4> = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0,
 /// Runs a check on distorted elements of every kind, of edge about 10 and far from the origin.
 macro_rules! on_all {
     ($check:ident) => {
-        shapes(TET4).for_each(|nodes| $check(nodes, tet4::points(&nodes).expect("it has a volume")));
+        shapes(TET4).for_each(|nodes| $check(nodes, Tet4::points(&nodes).expect("it has a volume")));
         shapes(TET4)
             .map(|corners| bent(&corners))
-            .for_each(|nodes| $check(nodes, tet10::points(&nodes).expect("it has a volume")));
+            .for_each(|nodes| $check(nodes, Tet10::points(&nodes).expect("it has a volume")));
         let cube = hex8::CORNERS.map(|x| x.map(|x| 0.5 * x));
-        shapes(cube).for_each(|nodes| $check(nodes, hex8::points(&nodes).expect("it has a volume")));
+        shapes(cube).for_each(|nodes| $check(nodes, Hex8::points(&nodes).expect("it has a volume")));
     };
 }
 
@@ -41,7 +44,7 @@ fn bent(corners: &Nodal<4>) -> Nodal<10> {
         let shift: [f64; 3] = random.vector(0.5);
         std::array::from_fn(|i| 0.5 * (corners[a][i] + corners[b][i]) + shift[i])
     };
-    let middles = tet10::EDGES.map(&mut middle);
+    let middles = cell::EDGES.map(&mut middle);
     std::array::from_fn(|a| if a < 4 { corners[a] } else { middles[a - 4] })
 }
 
@@ -154,7 +157,7 @@ fn has_right_derivatives<const N: usize, const P: usize>(_: Nodal<N>, points: [P
     let (back, here, ahead) = (at(-h), at(0.0), at(h));
     let sum: f64 = here.1.as_flattened().iter().map(|f| f.abs()).sum();
     assert!(((ahead.0 - back.0) / (2.0 * h) - contract(&here.1, &direction)).abs() < 1e-6 * sum);
-    let k = stiffness(&points, |point| material.tangent(&point.strain(&u), &virgin));
+    let k = stiffness(&points, |point| material.stiffness(&point.strain(&u), &virgin, None));
     let slopes = ahead.1.as_flattened().iter().zip(back.1.as_flattened()).map(|(a, b)| (a - b) / (2.0 * h));
     for (slope, force) in slopes.zip(times(&k, &direction).as_flattened()) {
         assert!((slope - force).abs() < 1e-6 * k[0][0][0][0]);

@@ -2,11 +2,8 @@
 //! (the order of VTK). Four Gauss points of degree two: exact for straight edges, and no motion but the rigid ones is
 //! free, as 4 x 6 strains and 6 motions make 30 unknowns. Edges may be curved; the map is that of the displacement.
 
-use super::cell::{EDGES_OF_TETRAHEDRON, FAR, NEAR, barycentric, four_points};
+use super::cell::{EDGES, FAR, NEAR, barycentric, four_points};
 use super::{Cell, DEGENERATE, Element, Gmsh, Nodal, Point, Sample, map};
-
-/// Corners of each edge, by its middle node less 4.
-pub const EDGES: [(usize, usize); 6] = EDGES_OF_TETRAHEDRON;
 
 /// The element.
 pub struct Tet10;
@@ -33,19 +30,38 @@ impl Element<10, 4> for Tet10 {
 
     #[inline]
     fn points(nodes: &Nodal<10>) -> Option<[Point<10>; 4]> {
-        points(nodes)
+        (Self::shape(nodes) > DEGENERATE).then(|| {
+            four_points().map(|place| {
+                let point = map::point(nodes, &derivatives(&place));
+                Point { weight: point.weight / 24.0, ..point }
+            })
+        })
     }
 
     fn values_at_points() -> [[f64; 10]; 4] {
-        four_points().map(values)
+        four_points().map(|at| Self::values(&at))
     }
 
+    /// Least determinant of the map from the reference tetrahedron at nodes and Gauss points, over the cube of the longest
+    /// distance of corners, times the root of two: 1 for the regular tetrahedron, negative if it is turned inside out somewhere.
     fn shape(nodes: &Nodal<10>) -> f64 {
-        shape(nodes)
+        let mut longest = 0.0_f64;
+        for (a, b) in EDGES {
+            longest = longest.max((0..3).map(|i| (nodes[a][i] - nodes[b][i]).powi(2)).sum());
+        }
+        let corner = |a: usize| std::array::from_fn(|b| f64::from(a == b));
+        let middle = |(a, b): (usize, usize)| std::array::from_fn(|c| if c == a || c == b { 0.5 } else { 0.0 });
+        let places = (0..4).map(corner).chain(EDGES.map(middle)).chain(four_points());
+        let least = places.map(|at| map::determinant(nodes, &derivatives(&at))).fold(f64::INFINITY, f64::min);
+        std::f64::consts::SQRT_2 * least / (longest * longest.sqrt())
     }
 
     fn values(at: &[f64]) -> [f64; 10] {
-        values(barycentric(at))
+        let at = barycentric(at);
+        let mut values = [0.0; 10];
+        (0..4).for_each(|a| values[a] = at[a] * (2.0 * at[a] - 1.0));
+        EDGES.iter().zip(&mut values[4..]).for_each(|(&(a, b), value)| *value = 4.0 * at[a] * at[b]);
+        values
     }
 
     fn extrapolation(at: &[f64]) -> [f64; 4] {
@@ -53,36 +69,10 @@ impl Element<10, 4> for Tet10 {
     }
 
     fn sample(nodes: &Nodal<10>, at: &[f64], weight: f64) -> Sample {
-        let point = self::at(nodes, &barycentric(at));
+        let point = map::point(nodes, &derivatives(&barycentric(at)));
         let values = Self::values(at).to_vec();
         Sample { weight: weight * point.weight, values, gradients: point.gradients.to_vec() }
     }
-}
-
-/// Values of the shape functions at barycentric coordinates.
-pub fn values(at: [f64; 4]) -> [f64; 10] {
-    let mut values = [0.0; 10];
-    (0..4).for_each(|a| values[a] = at[a] * (2.0 * at[a] - 1.0));
-    EDGES.iter().zip(&mut values[4..]).for_each(|(&(a, b), value)| *value = 4.0 * at[a] * at[b]);
-    values
-}
-
-/// The integration points, and `None` if the [`shape`] is [`DEGENERATE`].
-#[inline]
-pub fn points(nodes: &Nodal<10>) -> Option<[Point<10>; 4]> {
-    (shape(nodes) > DEGENERATE).then(|| {
-        four_points().map(|place| {
-            let point = at(nodes, &place);
-            Point { weight: point.weight / 24.0, ..point }
-        })
-    })
-}
-
-/// A point of unit weight in the reference tetrahedron, at barycentric coordinates.
-#[inline]
-pub fn at(nodes: &Nodal<10>, place: &[f64; 4]) -> Point<10> {
-    let (determinant, gradients) = map::gradients(nodes, &derivatives(place));
-    Point { weight: determinant, gradients, dilatation: None }
 }
 
 /// Derivatives of the shape functions by the barycentric coordinates of corners 1, 2, 3.
@@ -100,24 +90,10 @@ fn derivatives(at: &[f64; 4]) -> Nodal<10> {
     derivatives
 }
 
-/// Least determinant of the map from the reference tetrahedron at nodes and Gauss points, over the cube of the longest
-/// distance of corners, times the root of two: 1 for the regular tetrahedron, negative if it is turned inside out somewhere.
-pub fn shape(nodes: &Nodal<10>) -> f64 {
-    let mut longest = 0.0_f64;
-    for (a, b) in EDGES {
-        longest = longest.max((0..3).map(|i| (nodes[a][i] - nodes[b][i]).powi(2)).sum());
-    }
-    let corner = |a: usize| std::array::from_fn(|b| f64::from(a == b));
-    let middle = |(a, b): (usize, usize)| std::array::from_fn(|c| if c == a || c == b { 0.5 } else { 0.0 });
-    let places = (0..4).map(corner).chain(EDGES.map(middle)).chain(four_points());
-    let least = places.map(|at| map::determinant(nodes, &derivatives(&at))).fold(f64::INFINITY, f64::min);
-    std::f64::consts::SQRT_2 * least / (longest * longest.sqrt())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::tet4;
+    use crate::element::tet4::Tet4;
 
     fn straight(corners: &Nodal<4>) -> Nodal<10> {
         let middle = |(a, b): (usize, usize)| std::array::from_fn(|i| 0.5 * (corners[a][i] + corners[b][i]));
@@ -130,10 +106,10 @@ mod tests {
     #[test]
     fn with_straight_edges_it_has_volume_and_shape_of_the_linear_one() {
         let nodes = straight(&CORNERS);
-        let [linear] = tet4::points(&CORNERS).expect("it has a volume");
-        let points = points(&nodes).expect("it has a volume");
+        let [linear] = Tet4::points(&CORNERS).expect("it has a volume");
+        let points = Tet10::points(&nodes).expect("it has a volume");
         assert!(points.iter().all(|p| (p.weight - linear.weight / 4.0).abs() < 1e-15));
-        assert!((shape(&nodes) - tet4::shape(&CORNERS)).abs() < 1e-14);
+        assert!((Tet10::shape(&nodes) - Tet4::shape(&CORNERS)).abs() < 1e-14);
     }
 
     /// The gradient of a quadratic function at each Gauss point.
@@ -142,8 +118,8 @@ mod tests {
         let nodes = straight(&CORNERS);
         let function = |[x, y, z]: [f64; 3]| x * x - 2.0 * x * y + 0.5 * z * z + y * z - x;
         let gradient = |[x, y, z]: [f64; 3]| [2.0 * x - 2.0 * y - 1.0, z - 2.0 * x, z + y];
-        for (near, point) in points(&nodes).expect("it has a volume").iter().enumerate() {
-            let values = values(std::array::from_fn(|a| if a == near { NEAR } else { FAR }));
+        for (near, point) in Tet10::points(&nodes).expect("it has a volume").iter().enumerate() {
+            let values = Tet10::values(&four_points()[near]);
             let place = std::array::from_fn(|i| (0..10).map(|a| values[a] * nodes[a][i]).sum());
             let expected = gradient(place);
             for i in 0..3 {
@@ -159,7 +135,7 @@ mod tests {
         bent[4] = std::array::from_fn(|i| 0.9 * CORNERS[1][i] + 0.1 * CORNERS[0][i]);
         let [a, b, c, d] = CORNERS;
         for nodes in [bent, straight(&[a, c, b, d]), straight(&[a, b, c, a])] {
-            assert_eq!(points(&nodes), None);
+            assert_eq!(Tet10::points(&nodes), None);
         }
     }
 }

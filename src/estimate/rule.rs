@@ -3,7 +3,7 @@
 //! Between the integration points of an element stresses are interpolated and extrapolated: constant in the linear
 //! tetrahedron, linear in the quadratic one, trilinear in the hexahedron. Volumes likewise.
 
-use crate::element::cell::{EDGES_OF_TETRAHEDRON, four_points};
+use crate::element::cell::{EDGES, four_points};
 use crate::element::sample::GAUSS;
 use crate::element::{Cell, Kind};
 
@@ -68,7 +68,7 @@ fn of_degree_five(kind: Kind) -> Vec<Place> {
         }
     }
     let near = 0.045_503_704_125_649_65;
-    for (a, b) in EDGES_OF_TETRAHEDRON {
+    for (a, b) in EDGES {
         let at = std::array::from_fn(|c| if c == a || c == b { 0.5 - near } else { near });
         places.push(tetrahedron(kind, at, 0.042_546_020_777_081_466));
     }
@@ -127,7 +127,7 @@ mod tests {
             // Corner values of a linear field are its nodal values; middles are means.
             let mut nodal = [0.0; 10];
             (0..4).for_each(|a| nodal[a] = field(std::array::from_fn(|b| f64::from(a == b))));
-            EDGES_OF_TETRAHEDRON.iter().enumerate().for_each(|(k, &(a, b))| nodal[4 + k] = 0.5 * (nodal[a] + nodal[b]));
+            EDGES.iter().enumerate().for_each(|(k, &(a, b))| nodal[4 + k] = 0.5 * (nodal[a] + nodal[b]));
             let expected: f64 = place.nodes.iter().zip(nodal).map(|(v, n)| v * n).sum();
             let found: f64 = place.samples.iter().zip(samples).map(|(c, s)| c * s).sum();
             assert!((found - expected).abs() < 1e-14);

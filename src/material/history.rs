@@ -1,13 +1,18 @@
 //! Histories as named arrays, for results and checkpoints.
 
-use super::law::{Variable, Variables};
+use super::law::Variables;
 use super::laws::History;
 
-/// The numbers of each variable, point by point, in the order in which files have them.
-pub fn arrays<'a>(histories: impl Iterator<Item = &'a History> + Clone) -> impl Iterator<Item = (Variable, Vec<f64>)> {
-    History::variables().enumerate().map(move |(k, variable)| {
-        (variable, histories.clone().flat_map(|history| history.values(k)).copied().collect())
-    })
+/// Name, numbers a point, and the numbers of each variable, point by point, in the order in which files have them.
+pub fn arrays<'a>(histories: impl Iterator<Item = &'a History>) -> Vec<(&'static str, usize, Vec<f64>)> {
+    let mut virgin = History::VIRGIN;
+    let mut arrays: Vec<_> = virgin.variables().map(|(name, values)| (name, values.len(), Vec::new())).collect();
+    for mut history in histories.copied() {
+        for ((_, values), (.., array)) in history.variables().zip(&mut arrays) {
+            array.extend_from_slice(values);
+        }
+    }
+    arrays
 }
 
 /// Histories from the array of each variable.
@@ -15,12 +20,13 @@ pub fn arrays<'a>(histories: impl Iterator<Item = &'a History> + Clone) -> impl 
 /// # Errors
 /// Those of `array`.
 pub fn from_arrays<E>(mut array: impl FnMut(&str) -> Result<Vec<f64>, E>) -> Result<Vec<History>, E> {
+    let mut virgin = History::VIRGIN;
     let mut histories = Vec::new();
-    for (k, Variable { name, components }) in History::variables().enumerate() {
+    for (k, (name, numbers)) in virgin.variables().enumerate() {
         let values = array(name)?;
-        histories.resize(values.len() / components, History::VIRGIN);
-        for (history, values) in histories.iter_mut().zip(values.chunks_exact(components)) {
-            history.values_mut(k).copy_from_slice(values);
+        histories.resize(values.len() / numbers.len(), History::VIRGIN);
+        for (history, values) in histories.iter_mut().zip(values.chunks_exact(numbers.len())) {
+            history.variables().nth(k).expect("all have the same variables").1.copy_from_slice(values);
         }
     }
     Ok(histories)
@@ -36,15 +42,14 @@ mod tests {
         let mut histories = vec![History::VIRGIN; 3];
         let mut next = 0.0;
         for history in &mut histories {
-            for k in 0..History::variables().count() {
-                for value in history.values_mut(k) {
-                    next += 1.0;
-                    *value = next;
-                }
+            for value in history.variables().flat_map(|(_, values)| values) {
+                next += 1.0;
+                *value = next;
             }
         }
-        let found: BTreeMap<&str, Vec<f64>> = arrays(histories.iter()).map(|(v, values)| (v.name, values)).collect();
-        assert_eq!(found.len(), History::variables().count(), "no two variables have one name");
+        let found = arrays(histories.iter()).into_iter().map(|(name, _, values)| (name, values));
+        let found: BTreeMap<&str, Vec<f64>> = found.collect();
+        assert_eq!(found.len(), histories[0].variables().count(), "no two variables have one name");
         assert_eq!(found["kappa"], [7.0, 14.0, 21.0]);
         assert_eq!(found["plastic_strain"][..7], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]);
         assert_eq!(from_arrays(|name| Ok::<_, ()>(found[name].clone())), Ok(histories));

@@ -3,28 +3,14 @@
 use super::Hooke;
 use crate::tensor::{Tangent, Voigt};
 
-/// A variable of a [`Variables`], as results and checkpoints name it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Variable {
-    /// Its name, the same for all laws that have it.
-    pub name: &'static str,
-    /// Numbers a point.
-    pub components: usize,
-}
-
-/// What a material point remembers between load steps.
+/// What a material point remembers between load steps. Results and checkpoints have its variables by name. A variable that
+/// several laws have is called the same in all of them.
 pub trait Variables: Copy + PartialEq {
     /// The state of a point that was never loaded.
     const VIRGIN: Self;
 
-    /// The variables, in the order in which files have them.
-    fn variables() -> impl Iterator<Item = Variable>;
-
-    /// A variable, by its place among [`Self::variables`].
-    fn values(&self, variable: usize) -> &[f64];
-
-    /// The same, to be overwritten.
-    fn values_mut(&mut self, variable: usize) -> &mut [f64];
+    /// The name and the numbers of each variable, in the order in which files have them.
+    fn variables(&mut self) -> impl Iterator<Item = (&'static str, &mut [f64])>;
 }
 
 /// What a material point answers to a strain.
@@ -91,9 +77,4 @@ pub trait Law {
 
     /// The state at the end of the step, to be committed once the load step has converged.
     fn commit(&self, strain: &Voigt, committed: &Self::State) -> Self::State;
-
-    /// [`Self::stiffness`] without a direction of flow.
-    fn tangent(&self, strain: &Voigt, committed: &Self::State) -> Tangent {
-        self.stiffness(strain, committed, None)
-    }
 }

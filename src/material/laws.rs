@@ -1,6 +1,6 @@
 //! The list of laws: [`Material`] is one of them, [`History`] has the state of each.
 
-use super::{BadParameter, Hooke, Law, Response, Variable, Variables, VonMises};
+use super::{BadParameter, Hooke, Law, Response, Variables, VonMises};
 use crate::tensor::{Tangent, Voigt};
 
 /// `Material` and `History`, and the law that a material is. The law is looked up where a point is asked, at the price of a
@@ -80,26 +80,8 @@ macro_rules! laws {
         impl Variables for History {
             const VIRGIN: Self = Self { $($name: <$law as Law>::State::VIRGIN,)+ };
 
-            fn variables() -> impl Iterator<Item = Variable> {
-                std::iter::empty()$(.chain(<$law as Law>::State::variables()))+
-            }
-
-            fn values(&self, variable: usize) -> &[f64] {
-                let mut left = variable;
-                $(match left.checked_sub(<$law as Law>::State::variables().count()) {
-                    None => return self.$name.values(left),
-                    Some(beyond) => left = beyond,
-                })+
-                panic!("there are {left} variables too few")
-            }
-
-            fn values_mut(&mut self, variable: usize) -> &mut [f64] {
-                let mut left = variable;
-                $(match left.checked_sub(<$law as Law>::State::variables().count()) {
-                    None => return self.$name.values_mut(left),
-                    Some(beyond) => left = beyond,
-                })+
-                panic!("there are {left} variables too few")
+            fn variables(&mut self) -> impl Iterator<Item = (&'static str, &mut [f64])> {
+                std::iter::empty()$(.chain(self.$name.variables()))+
             }
         }
     };

@@ -11,7 +11,7 @@ pub mod laws;
 pub mod von_mises;
 
 pub use elastic::Hooke;
-pub use law::{BadParameter, Law, Response, Variable, Variables};
+pub use law::{BadParameter, Law, Response, Variables};
 pub use laws::{History, Material};
 pub use von_mises::VonMises;
 

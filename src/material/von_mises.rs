@@ -26,7 +26,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Hooke;
-use super::law::{BadParameter, Law, Response, Variable, Variables};
+use super::law::{BadParameter, Law, Response, Variables};
 use crate::tensor::{Tangent, Voigt, contract, deviator, stress_norm, trace};
 
 /// Parameters, as a scene has them; stresses and moduli in one unit.
@@ -68,16 +68,9 @@ pub struct PlasticState {
 impl Variables for PlasticState {
     const VIRGIN: Self = Self { plastic_strain: [0.0; 6], kappa: 0.0 };
 
-    fn variables() -> impl Iterator<Item = Variable> {
-        [("plastic_strain", 6), ("kappa", 1)].into_iter().map(|(name, components)| Variable { name, components })
-    }
-
-    fn values(&self, variable: usize) -> &[f64] {
-        if variable == 0 { &self.plastic_strain } else { std::slice::from_ref(&self.kappa) }
-    }
-
-    fn values_mut(&mut self, variable: usize) -> &mut [f64] {
-        if variable == 0 { &mut self.plastic_strain } else { std::slice::from_mut(&mut self.kappa) }
+    fn variables(&mut self) -> impl Iterator<Item = (&'static str, &mut [f64])> {
+        let Self { plastic_strain, kappa } = self;
+        [("plastic_strain", &mut plastic_strain[..]), ("kappa", std::slice::from_mut(kappa))].into_iter()
     }
 }
 

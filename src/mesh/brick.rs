@@ -18,7 +18,7 @@ pub const TETS: [[usize; 4]; 6] = [[0, 1, 2, 5], [0, 2, 4, 5], [2, 4, 5, 6], [1,
 pub const HEXAHEDRON: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
 /// Corners of the two triangles that [`TETS`] leave on each face of a cell, by [`Face`]; their normals point outwards.
-pub const FACE_TRIANGLES: [[[usize; 3]; 2]; 6] = [
+const FACE_TRIANGLES: [[[usize; 3]; 2]; 6] = [
     [[0, 4, 2], [2, 4, 6]],
     [[1, 3, 5], [3, 7, 5]],
     [[0, 1, 5], [0, 5, 4]],
@@ -61,11 +61,6 @@ impl Brick {
     /// Number of cells.
     pub fn cell_count(&self) -> u64 {
         self.cells.iter().map(|&n| n as u64).product()
-    }
-
-    /// Number of tetrahedra.
-    pub fn element_count(&self) -> u64 {
-        6 * self.cell_count()
     }
 
     /// All cells, as a block of cell indices.
@@ -157,14 +152,6 @@ impl Brick {
         (self.element(cell, tet), weights)
     }
 
-    /// The layer of cells that touch a face.
-    pub fn cells_on(&self, face: Face) -> Block {
-        let mut block = self.all_cells();
-        let last = self.cells[face.axis()] - 1;
-        block[face.axis()] = if face.is_upper() { last..last + 1 } else { 0..1 };
-        block
-    }
-
     /// The layer of nodes on a face.
     pub fn nodes_on(&self, face: Face) -> Block {
         let mut block = self.all_nodes();
@@ -178,20 +165,15 @@ impl Brick {
         at[face.axis()] == if face.is_upper() { self.cells[face.axis()] } else { 0 }
     }
 
-    /// Node numbers of the two triangles on a face of a cell, normals outwards.
-    pub fn cell_triangles(&self, cell: [usize; 3], face: Face) -> [[u64; 3]; 2] {
-        let corners = self.corners(cell);
-        FACE_TRIANGLES[face as usize].map(|triangle| triangle.map(|v| corners[v]))
-    }
-
     /// Node numbers of all triangles on a face of the body, normals outwards, in the order of their cells.
     pub fn triangles_on(&self, face: Face) -> impl Iterator<Item = [u64; 3]> {
-        indices(&self.cells_on(face)).flat_map(move |cell| self.cell_triangles(cell, face))
-    }
-
-    /// Number of triangles on a face of the body.
-    pub fn triangle_count(&self, face: Face) -> u64 {
-        2 * self.cell_count() / self.cells[face.axis()] as u64
+        let mut cells = self.all_cells();
+        let last = self.cells[face.axis()] - 1;
+        cells[face.axis()] = if face.is_upper() { last..last + 1 } else { 0..1 };
+        indices(&cells).flat_map(move |cell| {
+            let corners = self.corners(cell);
+            FACE_TRIANGLES[face as usize].map(|triangle| triangle.map(|v| corners[v]))
+        })
     }
 }
 

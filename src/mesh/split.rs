@@ -46,7 +46,8 @@ pub fn triangles(corners: &[u32], mut give: impl FnMut([u32; 3])) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::{Kind, tet4};
+    use crate::element::tet4::Tet4;
+    use crate::element::{Element, Kind};
     use crate::mesh::Elements;
     use crate::mesh::faces::{Neighbours, key};
     use crate::random::Random;
@@ -84,7 +85,7 @@ mod tests {
                 let place = |n: u32| points[numbers.iter().position(|&m| m == n).unwrap()];
                 let mut tets = Vec::new();
                 tetrahedra(&numbers, |tet| tets.push(tet));
-                let volume_of = |tet: &[u32; 4]| tet4::points(&tet.map(place)).expect("positive")[0].weight;
+                let volume_of = |tet: &[u32; 4]| Tet4::points(&tet.map(place)).expect("positive")[0].weight;
                 let total: f64 = tets.iter().map(volume_of).sum();
                 assert!((total - volume).abs() < 1e-14);
                 assert_eq!(tets.len(), count);

@@ -1,6 +1,7 @@
 //! The rows of B of a scene, and their right-hand sides at the end of each step of its load history.
 
 use super::ModelError;
+use super::contacts::Contacts;
 use crate::comm::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::prescribed::Prescribed;
@@ -23,9 +24,7 @@ pub(super) struct Given<'a> {
     pub decomposition: &'a Decomposition,
     /// With the displacements that the scene gives.
     pub supports: &'a [Support],
-    /// Names of the contacts.
-    pub contacts: &'a [String],
-    pub pairs: &'a [ContactPair],
+    pub contacts: &'a Contacts,
     /// Young's modulus of each subdomain, of all ranks.
     pub stiffness: &'a [f64],
 }
@@ -39,7 +38,7 @@ pub(super) fn constraints(
     comm: &dyn Comm,
     given: &Given,
 ) -> Result<(Constraints, RightHandSides), ModelError> {
-    let &Given { decomposition, supports, contacts, pairs, stiffness } = given;
+    let &Given { decomposition, supports, contacts, stiffness } = given;
     let agreed = |at: &Prescribed| {
         let outcome = dirichlet::check(comm, &decomposition.interface, supports, at);
         agree(comm, "supports", outcome).map_err(ModelError::Supports)
@@ -47,8 +46,8 @@ pub(super) fn constraints(
     let steps = scene.steps();
     let at = given.prescribed(scene, Some(&steps[0]));
     agreed(&at)?;
-    let constraints = Constraints::new(comm, decomposition, supports, pairs, stiffness, &at);
-    refuse_held(comm, contacts, pairs, &constraints.idle_distances(&at))?;
+    let constraints = Constraints::new(comm, decomposition, supports, &contacts.pairs, stiffness, &at);
+    refuse_held(comm, contacts, &constraints.idle_distances(&at))?;
     let first = constraints.right_hand_sides(&at);
 
     let displacements = supports.iter().map(|s| s.displacement);
@@ -60,7 +59,7 @@ pub(super) fn constraints(
     let right_hand_sides = |step: Option<&Step>| {
         let at = given.prescribed(scene, step);
         agreed(&at)?;
-        refuse_held(comm, contacts, pairs, &constraints.idle_distances(&at))?;
+        refuse_held(comm, contacts, &constraints.idle_distances(&at))?;
         Ok::<_, ModelError>(constraints.right_hand_sides(&at))
     };
     let begin = right_hand_sides(None)?;
@@ -89,7 +88,7 @@ impl Given<'_> {
         };
         Prescribed {
             displacements: self.supports.iter().map(of_support).collect(),
-            gaps: self.pairs.iter().map(gap).collect(),
+            gaps: self.contacts.pairs.iter().map(gap).collect(),
         }
     }
 }
@@ -100,8 +99,7 @@ const HELD_OVERLAP: f64 = 1e-6;
 /// Refuses contacts that supports violate, given the distances that are left on this rank, by pair. Collective.
 fn refuse_held(
     comm: &dyn Comm,
-    names: &[String],
-    pairs: &[ContactPair],
+    Contacts { names, pairs, .. }: &Contacts,
     distances: &[(usize, f64)],
 ) -> Result<(), ContactError> {
     let mine: Vec<u64> = distances.iter().flat_map(|&(pair, left)| [pair as u64, left.to_bits()]).collect();

@@ -65,7 +65,9 @@ pub(super) fn pair(
             }
             _ => unreachable!("two sides have two surfaces"),
         };
-        set_distances(contact, &mut pairs);
+        for pair in &mut pairs {
+            pair.gap = contact.clearance.unwrap_or(pair.gap + contact.gap);
+        }
         if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
             let found = sagitta::unresolved(&surfaces[slave].1, &master.1, &pairs);
             warnings.extend(found.map(|found| extent::unresolved(name, &found, pairs.len())));
@@ -89,14 +91,6 @@ pub(super) fn pair(
     }
     corner::check(&all.names, &all.pairs, held)?;
     Ok((all, warnings))
-}
-
-/// The distances that a contact wants: its clearance, or those of the meshes and its gap.
-fn set_distances(contact: &Contact, pairs: &mut [ContactPair]) {
-    pairs.iter_mut().for_each(|pair| match contact.clearance {
-        Some(clearance) => pair.set_distance(clearance),
-        None => pair.widen(contact.gap),
-    });
 }
 
 fn rule_name(rule: Rule) -> &'static str {

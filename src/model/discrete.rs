@@ -89,8 +89,7 @@ pub fn discretise_expecting(
     let given = conditions::Given {
         decomposition: &decomposition,
         supports: &supports,
-        contacts: &contacts.names,
-        pairs: &contacts.pairs,
+        contacts: &contacts,
         stiffness: &comm.all_gather(&young, &decomposition.shares.counts(1)),
     };
     let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given)?;

@@ -146,7 +146,7 @@ impl<'a> Places<'a> {
         let mut values = vec![None; width * self.nodes.len()];
         for (&node, row) in rows.places.iter().zip(rows.read::<T>(file, name, state)?.chunks_exact(width)) {
             for (known, &value) in values[width * node..].iter_mut().zip(row) {
-                // What cannot be compared is not a number, which others know.
+                // NaN gives way to the value of any other copy.
                 let counts = |known: &T| value > *known || known.partial_cmp(known).is_none();
                 if known.as_ref().is_none_or(counts) {
                     *known = Some(value);

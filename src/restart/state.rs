@@ -2,8 +2,8 @@
 //!
 //! A row for each integration point that has ever flowed: the first four nodes of its element, which tell elements apart,
 //! its number there, and what it remembers. Nodes count over all bodies of the scene that wrote them. So neither ranks nor
-//! subdomains matter, and bodies may be others, if only those that take their state have the same mesh. The displacement
-//! comes with it, from the last fields: equilibrium with that state does not depend on it, but is near.
+//! subdomains matter. Only the bodies that take their state need the same mesh as there. The displacement of the last fields
+//! comes with it: the equilibrium with that state does not depend on it, but is near it.
 
 use std::io::{self, ErrorKind};
 use std::ops::Range;
@@ -50,8 +50,8 @@ pub fn pack(problem: &TornProblem, meshes: Vec<MeshOf>) -> State {
     let description = Description { meshes, sizes: problem.committed.sizes };
     let mut arrays =
         vec![Field::of("nodes", 4, Values::Integer(nodes)), Field::of("point", 1, Values::Integer(points))];
-    let variables = history::arrays(histories.into_iter());
-    arrays.extend(variables.map(|(of, values)| Field::of(of.name, of.components, Values::Real(values))));
+    let variables = history::arrays(histories.into_iter()).into_iter();
+    arrays.extend(variables.map(|(name, numbers, values)| Field::of(name, numbers, Values::Real(values))));
     State { description: serde_json::to_string(&description).expect("numbers and names can be written"), arrays }
 }
 
@@ -114,18 +114,18 @@ fn read(
         return Err("it has no state to start from: solve the scene that it is of again, with this program".into());
     };
     let here = meshes(comm, scene, discrete);
-    let mut taken = Taken { ranges: Vec::new() };
+    let mut taken = Vec::new();
     for (body, mesh) in here.iter().enumerate() {
         if initial.bodies.as_ref().is_none_or(|wanted| wanted.contains(&mesh.body)) {
-            taken.ranges.push((same(mesh, &there)?, mesh.first_node, body));
+            taken.push((same(mesh, &there)?, mesh.first_node, body));
         }
     }
 
     let subdomains = &discrete.decomposition.subdomains;
-    let places = Places::new(subdomains, |s| taken.ranges.iter().any(|(_, _, body)| *body == s.body));
+    let places = Places::new(subdomains, |s| taken.iter().any(|(_, _, body)| *body == s.body));
     let nodes =
-        Wanted::find(&file, "VTKHDF/PointData/node", |node| taken.here(node).and_then(|[node]| places.node(node)))?;
-    let elements = Wanted::find(&file, "state/nodes", |key| taken.here(key).and_then(|key| places.element(key)))?;
+        Wanted::find(&file, "VTKHDF/PointData/node", |node| moved(&taken, node).and_then(|[node]| places.node(node)))?;
+    let elements = Wanted::find(&file, "state/nodes", |key| moved(&taken, key).and_then(|key| places.element(key)))?;
     let of_elements = elements.read::<i64>(&file, "state/point", 0)?;
     let count = |k: usize| subdomains[k].elements.kind().points();
     let found = || elements.rows().zip(&of_elements);
@@ -147,18 +147,11 @@ fn read(
     Ok(Earlier { committed: Committed { histories, sizes }, u })
 }
 
-/// The bodies that take their state from the file.
-struct Taken {
-    /// Numbers of the nodes there, the first number here, and the body's index.
-    ranges: Vec<(Range<i64>, u64, usize)>,
-}
-
-impl Taken {
-    /// Nodes of a body by their numbers here; `None` if the body is not taken.
-    fn here<const N: usize>(&self, there: [i64; N]) -> Option<[i64; N]> {
-        let (range, first, _) = self.ranges.iter().find(|(range, ..)| range.contains(&there[0]))?;
-        Some(there.map(|node| node - range.start + *first as i64))
-    }
+/// Nodes of a body by their numbers here; `None` if the body does not take its state from the file. Those that do have the
+/// numbers of their nodes there, the first number here, and their index.
+fn moved<const N: usize>(taken: &[(Range<i64>, u64, usize)], there: [i64; N]) -> Option<[i64; N]> {
+    let (range, first, _) = taken.iter().find(|(range, ..)| range.contains(&there[0]))?;
+    Some(there.map(|node| node - range.start + *first as i64))
 }
 
 /// The numbers in a file of a body's nodes.

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use super::OutputError;
 use super::hdf5::{Number, SharedFile};
-use super::piece::{Field, Values};
+use super::piece::Field;
 use super::replace::replace;
 use super::seal;
 use super::target::{Target, behind_links};
@@ -39,7 +39,7 @@ pub fn write(comm: &dyn Comm, path: &Path, texts: &[(&str, String)], arrays: &[F
             groups.dedup();
             groups.iter().try_for_each(|group| file.group(group))?;
             texts.iter().try_for_each(|(name, text)| file.text(name, text))?;
-            arrays.iter().try_for_each(|field| put(&file, field))?;
+            arrays.iter().try_for_each(|field| file.field(&field.name, field))?;
             file.close()?;
         }
         seal::seal(comm, temporary)?;
@@ -51,12 +51,6 @@ pub fn write(comm: &dyn Comm, path: &Path, texts: &[(&str, String)], arrays: &[F
             }
         })
     })
-}
-
-fn put(file: &SharedFile, Field { name, components, states }: &Field) -> Result<(), String> {
-    let real: Vec<&[f64]> = states.iter().filter_map(Values::real).collect();
-    let integer: Vec<&[i64]> = states.iter().filter_map(Values::integer).collect();
-    if integer.is_empty() { file.states(name, *components, &real) } else { file.states(name, *components, &integer) }
 }
 
 /// Where the checkpoint before is kept: beside the file itself, where `path` is a link to it.

@@ -20,6 +20,7 @@ use hdf5_metno_sys::h5i::hid_t;
 use hdf5_metno_sys::h5p::{H5FD_mpio_xfer_t, H5P_DEFAULT, H5Pclose, H5Pcreate, H5Pset_dxpl_mpio};
 use hdf5_metno_sys::h5s::{H5S_SELECT_SET, H5Sclose, H5Screate_simple, H5Sselect_hyperslab, H5Sselect_none};
 
+use super::piece::{Field, Values};
 use crate::comm::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
 
@@ -144,6 +145,20 @@ impl<'a> SharedFile<'a> {
             agree(self.comm, name, self.transfer(&dataset, state * total + begin, count, bytes))?;
         }
         Ok(())
+    }
+
+    /// Writes all states of a field as such an array.
+    ///
+    /// # Errors
+    /// If HDF5 refuses or the disk is full.
+    pub fn field(&self, name: &str, Field { components, states, .. }: &Field) -> Result<(), String> {
+        let real: Vec<&[f64]> = states.iter().filter_map(Values::real).collect();
+        let integer: Vec<&[i64]> = states.iter().filter_map(Values::integer).collect();
+        if integer.is_empty() {
+            self.states(name, *components, &real)
+        } else {
+            self.states(name, *components, &integer)
+        }
     }
 
     /// Writes a text, the same on every rank, as a scalar dataset of a UTF-8 string of fixed length.

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::OutputError;
 use super::hdf5::SharedFile;
-use super::piece::{Field, Piece, Values};
+use super::piece::{Field, Piece};
 use super::replace::replace;
 use crate::comm::agree::{agree, on_root, root_texts};
 use crate::comm::solo::Solo;
@@ -119,17 +119,7 @@ fn put_mesh(file: &SharedFile, rows: &Piece, sizes: &[[usize; 3]]) -> Result<(),
 }
 
 fn put_fields(file: &SharedFile, group: &str, fields: &[Field]) -> Result<(), String> {
-    for Field { name, components, states } in fields {
-        let name = format!("{group}/{name}");
-        let real: Vec<&[f64]> = states.iter().filter_map(Values::real).collect();
-        let integer: Vec<&[i64]> = states.iter().filter_map(Values::integer).collect();
-        if integer.is_empty() {
-            file.states(&name, *components, &real)?;
-        } else {
-            file.states(&name, *components, &integer)?;
-        }
-    }
-    Ok(())
+    fields.iter().try_for_each(|field| file.field(&format!("{group}/{}", field.name), field))
 }
 
 /// Where each time finds its values; the mesh begins at 0 for all of them.
@@ -183,6 +173,7 @@ fn signed(ids: &[u64]) -> Vec<i64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::piece::Values;
     use super::*;
     use crate::comm::threads;
     use hdf5_metno::File;

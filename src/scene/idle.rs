@@ -3,9 +3,8 @@
 //! Keys that contradict each other, or that surely are mistakes, are refused by [`super::check`]. Whether a value that is
 //! the default was written cannot be told, and does not matter.
 
-use super::contact::Contact;
 use super::load::Load;
-use super::{Expansion, Method, Qp, Scene};
+use super::{Expansion, Method, Qp, Scene, Step};
 
 /// A sentence for each key without effect, section by section.
 pub(super) fn warnings(scene: &Scene) -> Vec<String> {
@@ -63,30 +62,20 @@ fn supports(scene: &Scene) -> Vec<String> {
 
 /// What steps scale, by its key, with its factor in each of them; and whether it is zero anyway.
 fn scaled(scene: &Scene) -> impl Iterator<Item = (String, Vec<f64>, bool)> {
-    let loads = scene.load.iter().map(|(name, load)| {
+    let factors = |of: &dyn Fn(&Step) -> f64| -> Vec<f64> { scene.steps().iter().map(of).collect() };
+    let loads = scene.load.iter().map(move |(name, load)| {
         let zero = match load {
             Load::Traction { traction: v, .. } | Load::BodyForce { body_force: v, .. } => *v == [0.0; 3],
             Load::Pressure { pressure, .. } => *pressure == 0.0,
         };
-        (format!("load.{name}"), scene.steps().iter().map(|step| step.of_load(name)).collect(), zero)
+        (format!("load.{name}"), factors(&|step| step.of_load(name)), zero)
     });
     let supports = scene.support.iter().filter(|(_, support)| moves(support.displacement));
-    let supports = supports.map(|(name, _)| {
-        (
-            format!("support.{name}.displacement"),
-            scene.steps().iter().map(|step| step.of_support(name)).collect(),
-            false,
-        )
-    });
-    let moved = |contact: &Contact| contact.displacement() != [0.0; 3];
-    let contacts = scene.contact.iter().filter(move |(_, contact)| moved(contact));
-    let contacts = contacts.map(|(name, _)| {
-        (
-            format!("contact.{name}.displacement"),
-            scene.steps().iter().map(|step| step.of_contact(name)).collect(),
-            false,
-        )
-    });
+    let supports = supports
+        .map(move |(name, _)| (format!("support.{name}.displacement"), factors(&|step| step.of_support(name)), false));
+    let contacts = scene.contact.iter().filter(|(_, contact)| contact.displacement() != [0.0; 3]);
+    let contacts = contacts
+        .map(move |(name, _)| (format!("contact.{name}.displacement"), factors(&|step| step.of_contact(name)), false));
     loads.chain(supports).chain(contacts)
 }
 

@@ -33,12 +33,8 @@ const HEIGHT: f64 = 1000.0;
 const EXACT: Demand = Demand::Below(1e-8);
 
 impl Case for Blocks {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn about(&self) -> &'static str {
-        self.about
+    fn title(&self) -> [&'static str; 2] {
+        [self.name, self.about]
     }
 
     fn scene(&self) -> String {

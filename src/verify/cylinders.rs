@@ -2,7 +2,7 @@
 
 use super::radial::{Radial, State};
 use super::run::Run;
-use super::{Case, Demand, Error, effectivity, material_line, orders};
+use super::{Case, Demand, Error, convergence, halved, material_line};
 use crate::analytic::cylinder::{Cylinder, CylinderState};
 use crate::element::Kind;
 use crate::material::VonMises;
@@ -50,12 +50,8 @@ impl Pressed {
 const BIAS: f64 = 0.01;
 
 impl Case for Pressed {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn about(&self) -> &'static str {
-        self.about
+    fn title(&self) -> [&'static str; 2] {
+        [self.name, self.about]
     }
 
     fn scene(&self) -> String {
@@ -76,8 +72,7 @@ impl Case for Pressed {
 
     fn levels(&self, element: Kind) -> Vec<usize> {
         match (element, self.increments) {
-            (Kind::Tet10, 1) => vec![2, 4, 8],
-            (_, 1) => vec![4, 8, 16],
+            (_, 1) => halved(element),
             (Kind::Tet10, _) => vec![2, 4],
             _ => vec![4, 8],
         }
@@ -101,13 +96,8 @@ impl Case for Pressed {
             State { displacement: r * strain[1], strain, stress }
         };
         let exact = Radial { about_axis: true, state: at };
-        let [energy, displacement] = run.norms(&exact);
-        let demands = orders(run.element(), false);
-        vec![
-            Error::new("energy norm", energy, demands[0]),
-            Error::new("displacement", displacement, demands[1]),
-            effectivity(run, &exact),
-            Error::new("outer radius", at_outer, Demand::Shown),
-        ]
+        let mut errors = convergence(run, &exact, false);
+        errors.push(Error::new("outer radius", at_outer, Demand::Shown));
+        errors
     }
 }

@@ -16,12 +16,8 @@ const APPROACH: f64 = 0.01;
 pub struct Ball;
 
 impl Case for Ball {
-    fn name(&self) -> &'static str {
-        "hertz"
-    }
-
-    fn about(&self) -> &'static str {
-        "a rigid ball on an elastic block"
+    fn title(&self) -> [&'static str; 2] {
+        ["hertz", "a rigid ball on an elastic block"]
     }
 
     fn scene(&self) -> String {

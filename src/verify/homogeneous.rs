@@ -91,12 +91,8 @@ fn traction(face: &str, value: [f64; 3]) -> String {
 const EXACT: Demand = Demand::Below(1e-8);
 
 impl Case for Homogeneous {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn about(&self) -> &'static str {
-        self.about
+    fn title(&self) -> [&'static str; 2] {
+        [self.name, self.about]
     }
 
     fn scene(&self) -> String {

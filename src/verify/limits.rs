@@ -55,12 +55,8 @@ fn close(element: Kind) -> Demand {
 }
 
 impl Case for Wall {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn about(&self) -> &'static str {
-        self.about
+    fn title(&self) -> [&'static str; 2] {
+        [self.name, self.about]
     }
 
     fn scene(&self) -> String {
@@ -112,12 +108,8 @@ const HALF: f64 = 50.0;
 const SLICE: f64 = 10.0;
 
 impl Case for Footing {
-    fn name(&self) -> &'static str {
-        "limit-footing"
-    }
-
-    fn about(&self) -> &'static str {
-        "the limit load of a strip footing, (2 + pi) sigma_y/sqrt(3)"
+    fn title(&self) -> [&'static str; 2] {
+        ["limit-footing", "the limit load of a strip footing, (2 + pi) sigma_y/sqrt(3)"]
     }
 
     fn scene(&self) -> String {

@@ -1,7 +1,7 @@
 //! Manufactured solutions on the unit cube: orders of all elements where the solution is smooth, and at a plastic front.
 
 use super::run::{Exact, Run};
-use super::{Case, Demand, Error, effectivity, material_line, orders};
+use super::{Case, Demand, Error, convergence, halved, material_line};
 use crate::analytic::manufactured::Manufactured;
 use crate::element::Kind;
 use crate::material::VonMises;
@@ -74,12 +74,8 @@ impl Exact for Manufactured {
 }
 
 impl Case for Smooth {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn about(&self) -> &'static str {
-        self.about
+    fn title(&self) -> [&'static str; 2] {
+        [self.name, self.about]
     }
 
     fn scene(&self) -> String {
@@ -107,7 +103,7 @@ impl Case for Smooth {
     }
 
     fn levels(&self, element: Kind) -> Vec<usize> {
-        if element.degree() == 1 { vec![4, 8, 16] } else { vec![2, 4, 8] }
+        halved(element)
     }
 
     fn force(&self) -> Option<fn([f64; 3]) -> [f64; 3]> {
@@ -115,13 +111,7 @@ impl Case for Smooth {
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {
-        let [energy, displacement] = run.norms(self.solution);
-        let demands = orders(run.element(), self.has_front);
-        let mut errors = vec![
-            Error::new("energy norm", energy, demands[0]),
-            Error::new("displacement", displacement, demands[1]),
-            effectivity(run, self.solution),
-        ];
+        let mut errors = convergence(run, self.solution, self.has_front);
         if self.solution.material.yield_stress.is_some() {
             let kappa = run.cells("equivalent_plastic_strain", |_, x| self.solution.kappa(x));
             errors.push(Error::new("plastic strain", kappa, Demand::Shown));

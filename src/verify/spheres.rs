@@ -2,7 +2,7 @@
 
 use super::radial::{Radial, State};
 use super::run::{Run, pressure_error};
-use super::{Case, Demand, Error, PAPER, effectivity, material_line, orders};
+use super::{Case, Demand, Error, PAPER, convergence, halved, material_line};
 use crate::analytic::hollow_sphere::{HollowSphere, SphereState, Unloaded};
 use crate::analytic::nested_spheres::NestedSpheres;
 use crate::element::Kind;
@@ -45,17 +45,9 @@ pub(super) fn symmetry(body: &str) -> String {
     ["x", "y", "z"].map(plane).concat()
 }
 
-fn levels(element: Kind) -> Vec<usize> {
-    if element.degree() == 1 { vec![4, 8, 16] } else { vec![2, 4, 8] }
-}
-
 impl Case for Hollow {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn about(&self) -> &'static str {
-        self.about
+    fn title(&self) -> [&'static str; 2] {
+        [self.name, self.about]
     }
 
     fn scene(&self) -> String {
@@ -75,7 +67,7 @@ impl Case for Hollow {
     }
 
     fn levels(&self, element: Kind) -> Vec<usize> {
-        levels(element)
+        halved(element)
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {
@@ -83,13 +75,7 @@ impl Case for Hollow {
         let left = self.unloaded.then(|| loaded.unloaded().expect("nothing yields on the way back"));
         let state = |_, r| left.as_ref().map_or_else(|| under_pressure(&loaded, r), |left| without_pressure(left, r));
         let exact = Radial { about_axis: false, state };
-        let [energy, displacement] = run.norms(&exact);
-        let demands = orders(run.element(), !self.is_elastic());
-        let mut errors = vec![
-            Error::new("energy norm", energy, demands[0]),
-            Error::new("displacement", displacement, demands[1]),
-            effectivity(run, &exact),
-        ];
+        let mut errors = convergence(run, &exact, !self.is_elastic());
         if !self.is_elastic() {
             let kappa = run.cells("equivalent_plastic_strain", |_, x| loaded.kappa(distance(x)));
             errors.push(Error::new("plastic strain", kappa, Demand::Shown));
@@ -141,12 +127,8 @@ const ELASTIC: VonMises = VonMises::elastic(PAPER.young, PAPER.poisson);
 const PRESSURE: f64 = 600.0;
 
 impl Case for Nested {
-    fn name(&self) -> &'static str {
-        "nested-spheres"
-    }
-
-    fn about(&self) -> &'static str {
-        "a yielding sphere that closes the gap to another one"
+    fn title(&self) -> [&'static str; 2] {
+        ["nested-spheres", "a yielding sphere that closes the gap to another one"]
     }
 
     fn scene(&self) -> String {
@@ -170,28 +152,25 @@ impl Case for Nested {
     }
 
     fn levels(&self, element: Kind) -> Vec<usize> {
-        levels(element)
+        halved(element)
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {
         let exact = NESTED.loaded(PRESSURE).expect("no wall yields through");
         let of = |body| if body == 0 { &exact.inner } else { &exact.outer };
         let field = Radial { about_axis: false, state: |body, r| under_pressure(of(body), r) };
-        let [energy, displacement] = run.norms(&field);
-        let [first, second] = orders(run.element(), true);
         let interface = SPHERE.outer;
         let at_interface = run.nodes(
             |body, x| body == 1 && (distance(x) / interface - 1.0).abs() < 1e-6,
             |x, u| (0..3).map(|i| u[i] * x[i]).sum::<f64>() / distance(x) / exact.outer.displacement(interface) - 1.0,
         );
         let closed = within_a_percent(run);
-        vec![
-            Error::new("energy norm", energy, first),
-            Error::new("displacement", displacement, second),
-            effectivity(run, &field),
+        let mut errors = convergence(run, &field, true);
+        errors.extend([
             Error::new("interface moved", at_interface, closed),
             Error::new("contact pressure", pressure_error(&run.contacts(), |_| exact.contact_pressure), closed),
             Error::new("plastic front", front(run, exact.inner.front()), of_front(run)),
-        ]
+        ]);
+        errors
     }
 }

@@ -57,7 +57,7 @@ fn strain_after(material: &VonMises, committed: &PlasticState, given: Voigt, hel
     held.iter().for_each(|&i| strain[i] = given[i]);
     for _ in 0..50 {
         let stress = material.respond(&strain, committed).stress;
-        let mut tangent = material.tangent(&strain, committed);
+        let mut tangent = material.stiffness(&strain, committed, None);
         let mut rest: Voigt = std::array::from_fn(|i| given[i] - stress[i]);
         for &i in held {
             tangent[i] = [0.0; 6];
@@ -146,7 +146,7 @@ fn stress_is_the_derivative_of_the_potential_and_the_tangent_that_of_the_stress(
     let mut random = Random::new(1);
     let h = 1e-8;
     for (material, strain, history) in states() {
-        let tangent = material.tangent(&strain, &history);
+        let tangent = material.stiffness(&strain, &history, None);
         let direction = random.vector(1.0);
         let at = |by| material.respond(&moved(&strain, &direction, by), &history);
         let (back, here, ahead) = (at(-h), at(0.0), at(h));
@@ -166,7 +166,7 @@ fn stress_is_the_derivative_of_the_potential_and_the_tangent_that_of_the_stress(
 fn tangent_is_symmetric_and_between_its_bounds() {
     let mut random = Random::new(2);
     for (material, strain, history) in states() {
-        let (c, tangent) = (material.hooke().tangent(), material.tangent(&strain, &history));
+        let (c, tangent) = (material.hooke().tangent(), material.stiffness(&strain, &history, None));
         assert!((0..36).all(|n| tangent[n / 6][n % 6] == tangent[n % 6][n / 6]));
         let hardening = material.hardening + material.kinematic_hardening;
         let least = hardening / (3.0 * material.hooke().shear_modulus() + hardening);
@@ -221,7 +221,7 @@ fn a_committed_point_waits() {
     for (material, strain, history) in states() {
         let after = material.commit(&strain, &history);
         close(material.commit(&strain, &after).kappa, after.kappa, 1e-12);
-        assert_eq!(material.tangent(&strain, &after), material.hooke().tangent());
+        assert_eq!(material.stiffness(&strain, &after, None), material.hooke().tangent());
     }
 }
 
@@ -297,7 +297,7 @@ fn for_small_changes_the_divergence_is_half_the_tangent() {
         if at.plastic != there.plastic || material.least_tangent() < 1e-2 {
             continue;
         }
-        let half = 0.5 * contract(&apply(&material.tangent(&strain, &history), &change), &change);
+        let half = 0.5 * contract(&apply(&material.stiffness(&strain, &history, None), &change), &change);
         close(material.divergence(&strain, &change, &history), half, 1e-6);
         tested += 1;
     }

@@ -1,9 +1,32 @@
 use super::*;
-use crate::element::tet4;
+use crate::element::Element;
+use crate::element::tet4::Tet4;
 use crate::mesh::surface;
 use std::collections::HashMap;
 
 const SMALL: Brick = Brick { origin: [600.0, -1.0, 1000.0], size: [3.0, 5.0, 0.7], cells: [4, 3, 2] };
+
+/// What only tests ask.
+impl Brick {
+    /// Number of tetrahedra.
+    pub fn element_count(&self) -> u64 {
+        6 * self.cell_count()
+    }
+
+    /// Number of triangles on a face of the body.
+    pub fn triangle_count(&self, face: Face) -> u64 {
+        2 * self.cell_count() / self.cells[face.axis()] as u64
+    }
+}
+
+impl Face {
+    /// Outward unit normal.
+    pub fn normal(self) -> [f64; 3] {
+        let mut normal = [0.0; 3];
+        normal[self.axis()] = if self.is_upper() { 1.0 } else { -1.0 };
+        normal
+    }
+}
 
 fn lower(level: usize) -> Brick {
     Brick { origin: [0.0; 3], size: [3000.0, 1000.0, 1000.0], cells: [30, 10, 10] }.refined(level)
@@ -56,7 +79,7 @@ fn tetrahedra_are_positive_equal_and_fill_the_brick() {
     let mut total = 0.0;
     for cell in indices(&SMALL.all_cells()) {
         for tet in SMALL.tets(cell) {
-            let volume = tet4::points(&place(&SMALL, tet)).expect("positively oriented")[0].weight;
+            let volume = Tet4::points(&place(&SMALL, tet)).expect("positively oriented")[0].weight;
             assert!((volume * SMALL.element_count() as f64 / 10.5 - 1.0).abs() < 1e-11);
             total += volume;
         }

@@ -26,7 +26,6 @@ pub use kind::Kind;
 
 use error::Place;
 use nodes::NodeTags;
-use sections::Header;
 use source::Source;
 
 /// A mesh file without its points and lines.
@@ -101,7 +100,7 @@ impl Msh {
     /// As [`Msh::read`].
     pub fn parse(input: impl BufRead, length: u64) -> Result<Self, Problem> {
         let mut source = Source::new(input, length);
-        let Header { version } = sections::header(&mut source)?;
+        let version = sections::header(&mut source)?;
         let mut msh = Self::default();
         let mut entities = HashMap::new();
         let mut tags = None;

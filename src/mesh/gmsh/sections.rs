@@ -7,17 +7,11 @@ use super::GroupName;
 use super::error::Problem;
 use super::source::Source;
 
-/// The format of the rest of the file.
-pub(super) struct Header {
-    /// 4 for 4.1, 2 for 2.2.
-    pub version: u8,
-}
-
 /// Physical groups of each surface and volume, by dimension and tag.
 pub(super) type Entities = HashMap<(i32, i32), Vec<i32>>;
 
-/// `$MeshFormat`, to its end.
-pub(super) fn header(source: &mut Source<impl BufRead>) -> Result<Header, Problem> {
+/// `$MeshFormat`, to its end. The version of the rest of the file: 4 for 4.1, 2 for 2.2.
+pub(super) fn header(source: &mut Source<impl BufRead>) -> Result<u8, Problem> {
     let first = source.filled_line()?;
     if first.is_none_or(|(_, line)| line != b"$MeshFormat") {
         return Err(Problem::NoMesh);
@@ -39,7 +33,7 @@ pub(super) fn header(source: &mut Source<impl BufRead>) -> Result<Header, Proble
         return Err(Problem::Foreign("another byte order"));
     }
     source.end("$EndMeshFormat")?;
-    Ok(Header { version: number })
+    Ok(number)
 }
 
 /// `$PhysicalNames`, which is text in binary files too.

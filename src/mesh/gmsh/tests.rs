@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::decomposition::{BodyMesh, Shape, number_bodies};
-use crate::element::{Kind, tet4};
+use crate::element::tet4::Tet4;
+use crate::element::{Element, Kind};
 use crate::mesh::brick::indices;
 use crate::mesh::surface::area_vector;
 use crate::mesh::{Brick, Face, SolidMesh};
@@ -20,7 +21,7 @@ fn parse(bytes: &[u8]) -> Result<Msh, Problem> {
 
 fn volume(mesh: &SolidMesh) -> f64 {
     let place = |tet: &[u32; 4]| tet.map(|n| mesh.points[n as usize]);
-    mesh.elements.of().iter().map(|tet| tet4::points(&place(tet)).expect("elements are checked")[0].weight).sum()
+    mesh.elements.of().iter().map(|tet| Tet4::points(&place(tet)).expect("elements are checked")[0].weight).sum()
 }
 
 /// Area times normal of a surface, and the number of its triangles.

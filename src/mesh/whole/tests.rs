@@ -1,6 +1,6 @@
 use super::*;
 use crate::element::Kind;
-use crate::element::tet10::EDGES;
+use crate::element::cell::EDGES;
 use crate::mesh::{Elements, Mapped, split};
 use crate::random::Random;
 

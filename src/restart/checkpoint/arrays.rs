@@ -2,7 +2,7 @@
 //!
 //! | group | a row is |
 //! |---|---|
-//! | `subdomains` | a subdomain: how many rows it has in other groups, what its factors are of |
+//! | `subdomains` | a subdomain: its number of rows in other groups, and at what its factors were made |
 //! | `points`, `cells` | a node's copy, an element |
 //! | `rows` | a row of B that a subdomain owns |
 //! | `contacts` | a contact row, by what tells it from others on other subdomains, too |
@@ -17,7 +17,7 @@ use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::basis::{Bases, Basis};
-use crate::material::{Variable, history};
+use crate::material::history;
 use crate::model::Discrete;
 use crate::newton::Snapshot;
 use crate::restart::places::key;
@@ -31,7 +31,7 @@ pub(super) struct Packer<'a> {
     owned: Vec<Vec<usize>>,
     /// First own subdomain.
     first: usize,
-    /// What the factors of whole subdomains, and of their interiors, are of.
+    /// Where factors of whole subdomains, and those of their interiors, were made.
     factor: Vec<Option<Basis>>,
     interior: Vec<Option<Basis>>,
 }
@@ -133,14 +133,11 @@ impl<'a> Packer<'a> {
 
     fn histories(&self) -> Vec<Field> {
         let histories = (0..self.own().len()).flat_map(|own| self.newton.committed.history(own));
-        let arrays = history::arrays(histories);
-        let field = |(of, values): (Variable, _)| {
-            Field::of(&format!("histories/{}", of.name), of.components, Values::Real(values))
-        };
-        arrays.map(field).collect()
+        let field = |(name, numbers, values)| Field::of(&format!("histories/{name}"), numbers, Values::Real(values));
+        history::arrays(histories).into_iter().map(field).collect()
     }
 
-    /// Directions of plastic flow: of the iterate, and of what factors are of.
+    /// Directions of plastic flow: those of the iterate, and those at which factors were made.
     fn flows(&self) -> Vec<Field> {
         let of_bases = |bases: &[Option<Basis>]| bases.iter().map(flow_of).collect();
         let (factor, interior) = (of_bases(&self.factor), of_bases(&self.interior));

@@ -1,8 +1,8 @@
 //! Arrays of a checkpoint on other subdomains of the same meshes.
 //!
 //! Displacements and fields go by node, histories and fields of cells by element, contact by slave node. Multipliers of
-//! gluing and factors are left behind: they are of the subdomains there, and are made anew from the rest. So are directions of
-//! plastic flow, which begin as those of the stress.
+//! gluing and factors belong to the subdomains of the file. They are not read, but computed again. So are directions of plastic
+//! flow, which begin as those of the stress.
 
 use std::collections::HashMap;
 

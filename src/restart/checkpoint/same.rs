@@ -148,7 +148,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Whether all ranks find it the same.
+/// Refuses other subdomains on every rank, unless all ranks find theirs the same.
 fn demand(comm: &dyn Comm, same: bool) -> Result<(), Miss> {
     agree(comm, "subdomains", if same { Ok(()) } else { Err("others") }).map_err(|_| Miss::Others)
 }
@@ -162,7 +162,7 @@ struct Part {
 }
 
 impl Part {
-    /// Of a group whose number of rows a subdomain the file tells; own subdomains have these counts, where they are known.
+    /// Of a group. The file tells how many rows each subdomain has; `count` tells how many an own one must have, if that is known.
     fn find(
         comm: &dyn Comm,
         discrete: &Discrete,

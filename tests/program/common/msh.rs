@@ -104,7 +104,10 @@ pub fn write_glued(parts: &Parts, form: Form, glued: impl Fn([f64; 3]) -> bool) 
         writer.text("\n");
     }
     writer.text("$EndMeshFormat\n");
-    let mut names: Vec<String> = (1..).zip(Face::ALL).map(|(tag, face)| format!("2 {tag} \"{face}\"\n")).collect();
+    let mut names: Vec<String> = (1..)
+        .zip(["xmin", "xmax", "ymin", "ymax", "zmin", "zmax"])
+        .map(|(tag, face)| format!("2 {tag} \"{face}\"\n"))
+        .collect();
     names.extend((1..).zip(parts).map(|(tag, (name, _))| format!("3 {tag} \"{name}\"\n")));
     writer.text(&format!("$PhysicalNames\n{}\n{}$EndPhysicalNames\n", names.len(), names.concat()));
     writer.binary = binary;

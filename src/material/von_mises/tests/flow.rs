@@ -27,7 +27,7 @@ fn any_direction_of_flow_gives_a_tangent_within_bounds() {
         let found = material.stiffness(&strain, &history, Some(&flow));
         let (elastic, least) = (material.hooke().tangent(), material.least_tangent());
         let radial = material.stiffness(&strain, &history, Some(&normal(&material, &strain, &history)));
-        let consistent = material.tangent(&strain, &history);
+        let consistent = material.stiffness(&strain, &history, None);
         for _ in 0..20 {
             let x: Voigt = random.vector(1.0);
             let (value, full) = (quadratic(&found, &x), quadratic(&elastic, &x));
