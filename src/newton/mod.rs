@@ -29,7 +29,7 @@ pub mod step;
 pub use iteration::{Begin, Iterate, Newton, Next, Settings, Start};
 pub use outcome::{Outcome, StepRecord};
 pub use problem::TornProblem;
-pub use program::{Method, ProgramSettings};
+pub use program::ProgramSettings;
 pub use snapshot::Snapshot;
 pub use step::{SolverState, StepSolver};
 

@@ -11,25 +11,16 @@ use super::problem::TornProblem;
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::qp::feasible::FeasibleSet;
-use crate::qp::mprgp::Expansion;
 use crate::qp::pcpg::Pcpg;
 use crate::qp::quadratic::{Quadratic, Space};
 use crate::qp::{Limits, Outcome, Statistics, active_set, power, smalse};
-
-/// Which solver takes a program with inequalities.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// Active sets, and SMALSE-M where they cycle.
-    ActiveSet,
-    /// SMALSE-M.
-    Smalse(Expansion),
-}
+use crate::scene::Qp;
 
 /// How to solve the programs.
 #[derive(Clone, Copy, Debug)]
 pub struct ProgramSettings {
-    /// Which solver.
-    pub method: Method,
+    /// Which solver takes a program with inequalities: active sets fall back on SMALSE-M where they cycle.
+    pub method: Qp,
     /// Tolerance relative to the first step's residual, which measures the whole displacement.
     pub tolerance: f64,
     /// Products with the Hessian that one program may take.
@@ -157,7 +148,7 @@ impl Programs {
             return self.equalities(problem, dual, lambda, b, limits);
         }
         let mut wasted = Statistics::default();
-        if self.settings.method == Method::ActiveSet {
+        if self.settings.method == Qp::ActiveSet {
             let found = self.active_set(problem, &mut dual, resultants, (lambda.clone(), b.clone()), limits)?;
             if found.outcome != Outcome::Cycled {
                 return Ok(found);
@@ -257,15 +248,11 @@ impl Programs {
                 multiplier
             });
             let lower = problem.constraints.laws().lower_bounds(&start);
-            let expansion = match self.settings.method {
-                Method::Smalse(expansion) => expansion,
-                Method::ActiveSet => Expansion::ProjectedCg,
-            };
             // With a norm that is not a number SMALSE-M ends as `Outcome::NotFinite`.
             let norm = self.norm.unwrap_or(f64::NAN);
             let solution = smalse::solve(
                 smalse::Problem { space: &space, function: &mut dual, b: &projected, set: &FeasibleSet::above(lower) },
-                &smalse::Settings { limits, norm, expansion },
+                &smalse::Settings { limits, norm },
                 smalse::Start { x, multiplier },
             );
             at_floor = self.note(&limits, solution.first_norm);

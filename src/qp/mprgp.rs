@@ -30,15 +30,6 @@ pub trait Hessian {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool;
 }
 
-/// What a step does that runs into bounds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Expansion {
-    /// The whole CG step, projected. Never worse in practice, and needs no norm.
-    ProjectedCg,
-    /// To the bound, then a projected gradient step of a fixed length.
-    Fixed,
-}
-
 /// The iterate with what belongs to it.
 pub struct Point {
     /// The unknowns.
@@ -81,7 +72,6 @@ struct Line {
 pub struct Mprgp<'a> {
     space: &'a dyn Space,
     set: &'a FeasibleSet,
-    expansion: Expansion,
     norm: f64,
     products: usize,
     parts: Parts,
@@ -95,12 +85,11 @@ pub struct Mprgp<'a> {
 
 impl<'a> Mprgp<'a> {
     /// `norm` is an estimate of the norm of H, `products` the number of products after which to give up.
-    pub fn new(space: &'a dyn Space, set: &'a FeasibleSet, expansion: Expansion, norm: f64, products: usize) -> Self {
+    pub fn new(space: &'a dyn Space, set: &'a FeasibleSet, norm: f64, products: usize) -> Self {
         let zero = || vec![0.0; set.dimension()];
         Self {
             space,
             set,
-            expansion,
             norm,
             products,
             parts: Parts::new(set.dimension()),
@@ -241,7 +230,7 @@ impl<'a> Mprgp<'a> {
     ) {
         self.old.copy_from_slice(&point.x);
         self.old_gradient.copy_from_slice(&point.gradient);
-        if self.expansion == Expansion::ProjectedCg && step.is_finite() {
+        if step.is_finite() {
             self.set.advance(&mut point.x, step, &self.p);
             point.refresh(hessian, b, statistics);
             if self.lowered(point) {

@@ -14,7 +14,7 @@
 //! A and two projections. Convergence does not depend on the quality of the norm, a few per cent are plenty.
 
 use super::feasible::FeasibleSet;
-use super::mprgp::{Expansion, Mprgp, Norms, Point};
+use super::mprgp::{Mprgp, Norms, Point};
 use super::penalty::Penalised;
 use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics, axpy};
@@ -49,8 +49,6 @@ pub struct Settings {
     pub limits: Limits,
     /// Estimate of the norm of P A P, see [`super::power`].
     pub norm: f64,
-    /// Step into bounds.
-    pub expansion: Expansion,
 }
 
 /// Where to start.
@@ -90,7 +88,7 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let norm = settings.norm;
     let penalty = PENALTY * norm;
     let mut hessian = Penalised { function, penalty, inside };
-    let mut inner = Mprgp::new(space, set, settings.expansion, penalty, settings.limits.products);
+    let mut inner = Mprgp::new(space, set, penalty, settings.limits.products);
     let mut statistics = Statistics::default();
     let mut point = first_point(space, &mut hessian, &right, x, &mut statistics);
 

@@ -4,7 +4,7 @@
 //! the default was written cannot be told, and does not matter.
 
 use super::load::Load;
-use super::{Expansion, Method, Qp, Scene, Step};
+use super::{Method, Qp, Scene, Step};
 
 /// A sentence for each key without effect, section by section.
 pub(super) fn warnings(scene: &Scene) -> Vec<String> {
@@ -115,12 +115,8 @@ fn settings(scene: &Scene) -> Vec<String> {
         let method = if scene.decomposition.method == Method::Auto { "auto" } else { "metis" };
         found.push(format!("decomposition.cells: method = \"{method}\" does not use them, but \"bricks\" does"));
     }
-    let open = scene.contact.is_empty();
-    if scene.solver.qp == Qp::SmalseM && open {
+    if scene.solver.qp == Qp::SmalseM && scene.contact.is_empty() {
         found.push("solver.qp: without contact there is no quadratic program, but equations".to_owned());
-    }
-    if scene.solver.expansion == Expansion::Fixed && (open || scene.solver.qp != Qp::SmalseM) {
-        found.push("solver.expansion: only smalse-m expands sets, in scenes with contact".to_owned());
     }
     found
 }

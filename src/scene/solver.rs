@@ -24,9 +24,6 @@ pub struct Solver {
     pub qp: Qp,
     /// Preconditioner of the dual problem.
     pub preconditioner: Preconditioner,
-    /// How the active set grows inside SMALSE-M. Only where `qp` is SMALSE-M: active sets that fall back on it take projected
-    /// conjugate gradient steps.
-    pub expansion: Expansion,
     /// What factors are stored in.
     pub precision: Precision,
 }
@@ -43,7 +40,6 @@ impl Default for Solver {
             qp_limit: 5000,
             qp: Qp::ActiveSet,
             preconditioner: Preconditioner::Dirichlet,
-            expansion: Expansion::ProjectedCg,
             precision: Precision::Mixed,
         }
     }
@@ -69,16 +65,6 @@ pub enum Preconditioner {
     Lumped,
     /// The Schur complement on the interface.
     Dirichlet,
-}
-
-/// How a step that would leave the bounds continues.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Expansion {
-    /// The full conjugate gradient step, projected onto the bounds.
-    ProjectedCg,
-    /// A half step to the bound, then a projected gradient step of fixed length.
-    Fixed,
 }
 
 /// What the factors of stiffness matrices are stored in. Residuals are always computed in double precision.

@@ -13,8 +13,7 @@ use crate::feti::preconditioner::Preconditioner;
 use crate::model::history::Stage;
 use crate::model::{self, Discrete, ModelError};
 use crate::monitor::timing::Timer;
-use crate::newton::{Method, ProgramSettings, Settings, StepSolver};
-use crate::qp::mprgp::Expansion;
+use crate::newton::{ProgramSettings, Settings, StepSolver};
 use crate::scene::{self, Scene};
 use crate::sparse::cholesky::Precision;
 
@@ -63,12 +62,7 @@ pub(super) fn step_solver<'a>(
 /// How the quadratic programs are solved.
 fn programs(scene: &Scene) -> ProgramSettings {
     let solver = &scene.solver;
-    let method = match (solver.qp, solver.expansion) {
-        (scene::Qp::ActiveSet, _) => Method::ActiveSet,
-        (scene::Qp::SmalseM, scene::Expansion::ProjectedCg) => Method::Smalse(Expansion::ProjectedCg),
-        (scene::Qp::SmalseM, scene::Expansion::Fixed) => Method::Smalse(Expansion::Fixed),
-    };
-    ProgramSettings { method, tolerance: solver.qp_tolerance, products: solver.qp_limit }
+    ProgramSettings { method: solver.qp, tolerance: solver.qp_tolerance, products: solver.qp_limit }
 }
 
 /// When Newton's method stops.

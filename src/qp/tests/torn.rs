@@ -4,7 +4,6 @@
 use super::dense::{Matrix, Plain, dot};
 use crate::qp::active_set::Face;
 use crate::qp::feasible::FeasibleSet;
-use crate::qp::mprgp::Expansion;
 use crate::qp::quadratic::Quadratic;
 use crate::qp::smalse::{Problem, Settings, Solution, Start, solve};
 use crate::qp::{Limits, axpy, power};
@@ -205,7 +204,7 @@ pub fn homogenised(torn: &mut Torn, relative: f64) -> Solution {
     let lower = shift.iter().zip(&torn.bounded).map(|(s, b)| if *b { -s } else { f64::NEG_INFINITY }).collect();
     let norm = power::norm(&Plain, torn, &b).expect("an estimate").norm;
     let limits = Limits { relative, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
-    let settings = Settings { limits, norm, expansion: Expansion::ProjectedCg };
+    let settings = Settings { limits, norm };
     let problem = Problem { space: &Plain, function: torn, b: &b, set: &FeasibleSet::above(lower) };
     let mut found = solve(problem, &settings, Start { x: vec![0.0; n], multiplier: None });
     axpy(1.0, &shift, &mut found.x);

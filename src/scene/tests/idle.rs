@@ -13,7 +13,7 @@ fn told(list: &[&str]) -> Vec<String> {
 
 #[test]
 fn what_has_no_effect_is_told_by_its_key() {
-    let cases: [(&[&str], &str); 17] = [
+    let cases: [(&[&str], &str); 15] = [
         (&["material.spare={young=1, poisson=0}"], "material.spare: no body"),
         (&["load.side={surface='block.xmax', traction=[0, 0, 0]}"], "load.side is zero"),
         (&["load.side={surface='block.xmax', pressure=0}"], "load.side is zero"),
@@ -29,8 +29,6 @@ fn what_has_no_effect_is_told_by_its_key() {
         (&["decomposition.method=metis", "decomposition.cells=[2, 2, 2]"], "decomposition.cells: method = \"metis\""),
         (&["decomposition.method=auto", "decomposition.cells=[2, 2, 2]"], "decomposition.cells: method = \"auto\""),
         (&["solver.qp=smalse-m"], "solver.qp: without contact"),
-        (&["solver.expansion=fixed"], "solver.expansion: only smalse-m"),
-        (&[FLOOR, "solver.expansion=fixed"], "solver.expansion: only smalse-m"),
         (&["support.also={surface='block.zmin', fix=['x', 'y', 'z']}"], "support.base: other supports"),
         (&["load.top={surface='block.zmax', traction=[0, 0, 0]}"], "load.top is zero"),
         (
@@ -59,7 +57,7 @@ fn what_has_an_effect_is_not_told() {
         &["decomposition.subdomains=4"],
         &["decomposition.method=metis"],
         &["decomposition.method=auto"],
-        &[FLOOR, "solver.qp=smalse-m", "solver.expansion=fixed"],
+        &[FLOOR, "solver.qp=smalse-m"],
         &[FLOOR, "contact.floor.displacement=[0, 0, 1]", "step=[{amplitude=0, contact={floor=1}}, {}]"],
         &["initial={result='a.vtkhdf'}", "load.top={surface='block.zmax', pressure=-1}"],
         &["material.steel.yield_stress=1", "material.steel.hardening=1"],

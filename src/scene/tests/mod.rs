@@ -110,7 +110,7 @@ fn effective_scenes_round_trip() {
         assert_eq!(Scene::from_text(&text, "echo", 1, &[]).unwrap(), scene, "{text}");
     }
     let metis =
-        two_blocks(&["decomposition.subdomains=7", "decomposition.cluster=3", "solver.expansion=fixed"]).unwrap();
+        two_blocks(&["decomposition.subdomains=7", "decomposition.cluster=3", "solver.precision=double"]).unwrap();
     assert_eq!(Scene::from_text(&metis.to_toml(), "echo", 1, &[]).unwrap(), metis);
     let steps = two_blocks(&["step=[{load={top=0.5}, increments=3}, {name='off', amplitude=0}]"]).unwrap();
     assert_eq!(Scene::from_text(&steps.to_toml(), "echo", 1, &[]).unwrap(), steps);

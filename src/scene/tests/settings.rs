@@ -53,9 +53,9 @@ fn solver_settings_are_checked() {
         refuses(&[&format!("solver.{key}=0")], &[&format!("solver.{key} = 0"), "at least 1"]);
     }
     refuses(&["solver.qp=simplex"], &["solver.qp=simplex", "smalse-m", "active-set"]);
-    let scene = one(&["solver.qp=active-set", "solver.preconditioner=dirichlet", "solver.expansion=fixed"]).unwrap();
-    let Solver { qp, preconditioner, expansion, .. } = scene.solver;
-    assert_eq!((qp, preconditioner, expansion), (Qp::ActiveSet, Preconditioner::Dirichlet, Expansion::Fixed));
+    let scene = one(&["solver.qp=active-set", "solver.preconditioner=lumped"]).unwrap();
+    let Solver { qp, preconditioner, .. } = scene.solver;
+    assert_eq!((qp, preconditioner), (Qp::ActiveSet, Preconditioner::Lumped));
 }
 
 #[test]
