@@ -8,7 +8,7 @@ use crate::sparse::pattern::Pattern;
 use crate::tensor::{Tangent, Voigt};
 
 /// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed history, with
-/// the directions of `flow` ([`super::flow`]); without them it is the consistent one. Returns the number of elements that yield.
+/// the directions of `flow` (`flow`); without them it is the consistent one. Returns the number of elements that yield.
 pub fn assemble(region: &Region, (u, flow): (&[f64], &[Voigt]), pattern: &Pattern, values: &mut [f64]) -> usize {
     values.fill(0.0);
     let elastic = region.material.hooke().tangent();

@@ -1,8 +1,8 @@
 //! The pipeline from a discrete problem to results: it joins the stages, and computes nothing itself.
 //!
-//! [`solve`] sets FETI up for the scene ([`solver`]), steps [`Newton`] through the history of loads, and keeps what is to be
-//! written of each increment ([`recorder`]): [`fields`], [`contact`], rows of the log and the summary ([`report`]) with the
-//! [`limits`] of the theory. [`cascade`] makes a start on a finer mesh of a solution.
+//! [`solve`] sets FETI up for the scene (`solver`), steps `Newton` through the history of loads, and keeps what is to be
+//! written of each increment (`recorder`): `fields`, [`contact`], rows of the log and the summary (`report`) with the
+//! `limits` of the theory. [`cascade`] makes a start on a finer mesh of a solution.
 
 pub mod cascade;
 pub mod contact;
