@@ -9,8 +9,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use fetiplast::comm::solo::Solo;
 use fetiplast::kernels::{
-    Analysis, Coarse, Factor, Factors, Gather, Lower, Precision, Region, RigidModes, Schur, Subdomain, Workspace,
-    analyse, stiffness,
+    Analysis, Coarse, Factor, Factors, Interconnection, Lower, Precision, Region, Schur, Subdomain, Workspace, analyse,
+    stiffness,
 };
 use fetiplast::model::{self, Discrete};
 use fetiplast::scene::Scene;
@@ -164,11 +164,9 @@ fn coarse(side: usize) {
     let Discrete { decomposition, constraints, .. } =
         &model::discretise(&scene, &Solo).expect("it has a discrete problem");
     let subdomains = &decomposition.subdomains;
-    let gather =
-        Gather::new(&Solo, &decomposition.shares, constraints, subdomains.iter().map(Subdomain::dofs).collect());
-    let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.points)).collect();
+    let connection = Interconnection::new(&Solo, decomposition, constraints);
     let start = Instant::now();
-    let mut coarse = Coarse::new(&Solo, &decomposition.clusters, subdomains, &modes, constraints, &gather);
+    let mut coarse = Coarse::new(&Solo, decomposition, constraints, &connection);
     coarse.factorise().expect("supports hold both bodies");
     let setup = start.elapsed().as_secs_f64();
     let start = Instant::now();

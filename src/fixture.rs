@@ -9,13 +9,14 @@ use crate::assembly::{Region, stiffness};
 use crate::comm::{Comm, threads};
 use crate::constraint::Row;
 use crate::decomposition::Subdomain;
+use crate::feti::Torn;
 use crate::feti::coarse::{Coarse, Floating};
+use crate::feti::dual::Interconnection;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::{Factors, analyse};
 use crate::feti::inverse::hybrid::Hybrid;
 use crate::feti::inverse::tangents::Linearisation;
-use crate::feti::{Interconnection, Torn};
 use crate::material::Material;
 use crate::model;
 use crate::model::discrete::Discrete;
@@ -191,7 +192,7 @@ impl<'a> Setup<'a> {
     /// Without a factor.
     pub fn bare_coarse(&self) -> Coarse<'a> {
         let Discrete { decomposition, constraints, .. } = &self.discrete;
-        self.connection.coarse(self.comm, decomposition, constraints)
+        Coarse::new(self.comm, decomposition, constraints, &self.connection)
     }
 
     /// Factors of the elastic stiffness matrices, and these.

@@ -86,6 +86,7 @@ mod feti;
 mod newton;
 
 mod restart;
+mod simd;
 mod sizing;
 mod span;
 mod sparse;
@@ -106,9 +107,8 @@ pub mod kernels {
     pub use crate::assembly::{Region, stiffness};
     pub use crate::decomposition::Subdomain;
     pub use crate::feti::coarse::Coarse;
-    pub use crate::feti::dual::gather::Gather;
+    pub use crate::feti::dual::Interconnection;
     pub use crate::feti::inverse::factor::{Factors, analyse};
-    pub use crate::feti::inverse::kernel::RigidModes;
     pub use crate::feti::inverse::schur::Schur;
     pub use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 }

@@ -5,7 +5,7 @@
 //! third of (m_a - g_a) . u_a is added to each normal strain: the trace is that of the means. Nodal vectors have three
 //! components a node.
 
-use crate::sparse::simd::vectorised;
+use crate::simd::vectorised;
 use crate::tensor::{COMPONENT, Tangent, Voigt, trace};
 
 /// A vector at each node.

@@ -8,17 +8,12 @@
 //! - [`coarse`]: `G`, `(G G')^-1`, `P`, and the rigid motions `alpha`;
 //! - [`preconditioner`]: approximate inverses of `F`.
 //!
-//! [`interconnection`] is what all of them need of a torn problem: `B`, inner products of multipliers, `R`.
-//!
 //! Where subdomains form clusters, `R` and `K^+` are those of the clusters ([`inverse::hybrid`]).
 
 pub mod coarse;
 pub mod dual;
-pub mod interconnection;
 pub mod inverse;
 pub mod preconditioner;
-
-pub use interconnection::Interconnection;
 
 /// A torn vector: for each own subdomain its local unknowns.
 pub type Torn = Vec<Vec<f64>>;

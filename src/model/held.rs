@@ -4,10 +4,10 @@ use super::ModelError;
 use super::discrete::Discrete;
 use super::history::{self, Stage};
 use crate::comm::Comm;
-use crate::feti::Interconnection;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::equilibrium::Unheld;
 use crate::feti::coarse::{equilibrium, recover};
+use crate::feti::dual::Interconnection;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::RigidModes;
 use crate::scene::Scene;
@@ -19,7 +19,7 @@ use crate::scene::Scene;
 pub fn held(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Result<(), ModelError> {
     let Discrete { decomposition, constraints, .. } = discrete;
     let connection = Interconnection::new(comm, decomposition, constraints);
-    let mut coarse = connection.coarse(comm, decomposition, constraints);
+    let mut coarse = Coarse::new(comm, decomposition, constraints, &connection);
     let (_, stages) = history::stages(scene, discrete, &|| connection.gather.zeros());
     at_all_stages(scene, discrete, &mut coarse, &connection.space, &connection.modes, &stages)
 }

@@ -2,7 +2,8 @@
 
 use crate::comm::Comm;
 use crate::decomposition::twins::{alike, twins};
-use crate::feti::Interconnection;
+use crate::feti::coarse::Coarse;
+use crate::feti::dual::Interconnection;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::analyse;
@@ -32,7 +33,7 @@ pub(super) fn step_solver<'a>(
     let Discrete { decomposition, constraints, .. } = discrete;
     let Interconnection { gather, space, modes } = connection;
     let (subdomains, clusters) = (&decomposition.subdomains[..], &decomposition.clusters);
-    let mut coarse = timer.time("coarse set-up", || connection.coarse(comm, decomposition, constraints));
+    let mut coarse = timer.time("coarse set-up", || Coarse::new(comm, decomposition, constraints, connection));
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
     let precision = match scene.solver.precision {
         scene::Precision::Mixed => Precision::Single,

@@ -13,7 +13,8 @@ use super::bodies::BodyMotions;
 use super::factor::{Blocks, CoarseAnalysis, CoarseFactor};
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{Constraints, Kind, Row};
-use crate::decomposition::{Clusters, Subdomain};
+use crate::decomposition::{Clusters, Decomposition, Subdomain};
+use crate::feti::dual::Interconnection;
 use crate::feti::dual::gather::Gather;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
 
@@ -143,15 +144,12 @@ impl Transposed {
 }
 
 impl<'a> Coarse<'a> {
-    /// Computes `G` of the clusters' `modes`, given for each own subdomain. Nothing is solved before [`Coarse::factorise`].
-    /// Collective.
+    /// Computes `G = R'B'`. Nothing is solved before [`Coarse::factorise`]. Collective.
     pub fn new(
         comm: &'a dyn Comm,
-        clusters: &Clusters,
-        subdomains: &[Subdomain],
-        modes: &[RigidModes],
+        Decomposition { clusters, subdomains, .. }: &Decomposition,
         constraints: &Constraints,
-        gather: &Gather,
+        Interconnection { gather, modes, .. }: &Interconnection,
     ) -> Self {
         let members: Vec<Range<usize>> = clusters.of_rank(comm.rank()).collect();
         let transposed = Transposed::new(clusters, subdomains, modes, constraints, gather);

@@ -2,10 +2,14 @@
 //!
 //! [`gather`] applies `B` and `B'`, [`operator`] applies `F`, [`space`] has inner products and sums over all ranks, [`gram`] and
 //! [`coupling`] solve with parts of `B B'`. [`pinned`] has the supports of unknowns that `K^+` keeps at zero.
+//! [`interconnection`] has `B`, inner products and `R` in one piece.
 
 pub mod coupling;
 pub mod gather;
 pub mod gram;
+pub mod interconnection;
 pub mod operator;
 pub mod pinned;
 pub mod space;
+
+pub use interconnection::Interconnection;

@@ -9,8 +9,8 @@ use std::rc::Rc;
 use super::factor::{NotDefinite, Symbolic};
 use super::stock::{Batch, Stock};
 use crate::feti::Torn;
+use crate::simd::vectorised;
 use crate::sparse::cholesky::{Factor, Precision, WIDTH, Workspace};
-use crate::sparse::simd::vectorised;
 use crate::sparse::submatrix::{Entries, Submatrix};
 
 /// Which unknowns are on the boundary, where their entries stand, and the analysis of the interior block.

@@ -16,7 +16,7 @@ use faer::linalg::solvers::DenseSolveCore;
 
 use super::bonds::{Bonds, Member};
 use crate::feti::inverse::kernel::MODES;
-use crate::sparse::simd::vectorised;
+use crate::simd::vectorised;
 
 /// `W`, `S^-1` and `(G S^-1 G')^-1`, by columns.
 pub struct DenseProblem {

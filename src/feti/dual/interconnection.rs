@@ -1,13 +1,12 @@
-//! What interconnects the torn subdomains: `B`, inner products of its rows, `R`, and from these the coarse problem.
+//! What interconnects the torn subdomains: `B`, inner products of its rows, and `R`.
 //!
 //! All follow from the decomposition and the rows alone: no material, no load.
 
+use super::gather::Gather;
+use super::space::RowSpace;
 use crate::comm::Comm;
 use crate::constraint::Constraints;
 use crate::decomposition::{Decomposition, Subdomain};
-use crate::feti::coarse::Coarse;
-use crate::feti::dual::gather::Gather;
-use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::{self, RigidModes};
 
 /// `B`, the space of the multipliers and `R` of one rank.
@@ -30,11 +29,5 @@ impl<'a> Interconnection<'a> {
             space: RowSpace::new(comm, shares, constraints),
             modes: kernel::of_clusters(clusters.of_rank(comm.rank()), subdomains),
         }
-    }
-
-    /// The coarse problem `G G'` with `G = R' B'`, not factorised yet. Collective.
-    pub fn coarse(&self, comm: &'a dyn Comm, decomposition: &Decomposition, constraints: &Constraints) -> Coarse<'a> {
-        let Decomposition { clusters, subdomains, .. } = decomposition;
-        Coarse::new(comm, clusters, subdomains, &self.modes, constraints, &self.gather)
     }
 }
