@@ -2,46 +2,45 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::element::Kind;
 use crate::material::{History, Variables};
 
-/// All source files but those of tests.
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+/// The source without comments and tests beside it: path of each file from the project's folder, and code.
+pub fn sources() -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    walk(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut found);
+    assert!(found.len() > 100, "{} files", found.len());
+    found
+}
+
+fn walk(folder: &Path, found: &mut Vec<(String, String)>) {
     for entry in fs::read_dir(folder).expect("the source is there") {
         let path = entry.expect("a folder can be read").path();
-        let is_test =
-            ["tests", "tests.rs", "orders.rs", "fixture.rs", "extension.rs"].iter().any(|name| path.ends_with(name));
-        if path.is_dir() && !is_test {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|end| end == "rs") && !is_test {
-            found.push(path);
+        if path.is_dir() {
+            walk(&path, found);
+        } else if path.extension().is_some_and(|end| end == "rs") && !path.ends_with("tests.rs") {
+            let text = fs::read_to_string(&path).expect("the source is text");
+            let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+            let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+            let name = path.strip_prefix(env!("CARGO_MANIFEST_DIR")).expect("it is in the project").display();
+            found.push((name.to_string(), lines.collect::<Vec<_>>().join("\n")));
         }
     }
 }
 
-/// Words of a file, without comments and tests.
-fn words(path: &Path) -> BTreeSet<String> {
-    let text = fs::read_to_string(path).expect("the source is text");
-    let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
-    let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
-    let words = lines.flat_map(|line| line.split(|c: char| !c.is_alphanumeric() && c != '_'));
-    words.map(str::to_owned).collect()
-}
-
-/// Fails if a file outside of these rooms has one of the words.
+/// Fails if a file outside of these rooms, and of tests, has one of the words.
 fn assert_only_in(rooms: &[&str], names: &[String]) {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&source, &mut files);
-    assert!(files.len() > 100, "{} files", files.len());
     let mut seen = BTreeSet::new();
-    for file in files {
-        let place = file.strip_prefix(&source).expect("it is in the source");
-        let known: Vec<&String> = names.iter().filter(|name| words(&file).contains(*name)).collect();
-        let may = rooms.iter().any(|room| place.starts_with(room));
-        assert!(may || known.is_empty(), "{} names {known:?}, which only {rooms:?} may", place.display());
+    let is_test = |file: &str| {
+        file.contains("/tests/") || ["/orders.rs", "/fixture.rs", "/extension.rs"].iter().any(|end| file.ends_with(end))
+    };
+    for (file, code) in sources().into_iter().filter(|(file, _)| !is_test(file)) {
+        let words: BTreeSet<&str> = code.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+        let known: Vec<&String> = names.iter().filter(|name| words.contains(&name[..])).collect();
+        let may = rooms.iter().any(|room| file.starts_with(&format!("src/{room}/")));
+        assert!(may || known.is_empty(), "{file} names {known:?}, which only {rooms:?} may");
         seen.extend(known.into_iter().cloned());
     }
     assert_eq!(seen.len(), names.len(), "{seen:?}");

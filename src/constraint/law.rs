@@ -183,10 +183,9 @@ impl Laws<'_> {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
-    use std::fs;
-    use std::path::Path;
 
     use super::*;
+    use crate::extension::sources;
 
     const LAWS: [Law; 2] = [Law::Equality, Law::Unilateral];
     const NUMBERS: [f64; 7] = [-2.0, -0.5, -0.0, 0.0, 1e-9, 0.75, 3.0];
@@ -241,28 +240,6 @@ mod tests {
         assert!(Law::Equality.is_kept(-3.0, 1.0) && Law::Equality.is_kept_at(2.0, 1.0));
     }
 
-    /// Code of the library without its tests, by path.
-    fn sources(directory: &Path) -> Vec<(String, String)> {
-        let mut found = Vec::new();
-        for entry in fs::read_dir(directory).expect("sources can be read") {
-            let path = entry.expect("sources can be read").path();
-            if path.is_dir() {
-                found.extend(sources(&path));
-            } else if path.extension().is_some_and(|end| end == "rs") && path.file_stem().is_some_and(|s| s != "tests")
-            {
-                let text = fs::read_to_string(&path).expect("sources can be read");
-                let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default().to_owned();
-                let name = path.strip_prefix(env!("CARGO_MANIFEST_DIR")).expect("it is below").display().to_string();
-                found.push((name, code));
-            }
-        }
-        found
-    }
-
-    fn library() -> Vec<(String, String)> {
-        sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
-    }
-
     /// The files that CONTRIBUTING.md names in its section on contact laws.
     fn listed() -> BTreeSet<String> {
         let text = include_str!("../../CONTRIBUTING.md");
@@ -278,7 +255,7 @@ mod tests {
             words.iter().any(|word| code.contains(word))
         };
         let asking: BTreeSet<String> =
-            library().into_iter().filter(|(_, code)| asks(code)).map(|(name, _)| name).collect();
+            sources().into_iter().filter(|(_, code)| asks(code)).map(|(name, _)| name).collect();
         let solvers = ["src/constraint/mod.rs", "src/qp/feasible.rs", "src/qp/active_set.rs", "src/newton/damping.rs"]
             .map(str::to_owned);
         let expected: BTreeSet<String> = asking.into_iter().chain(solvers).collect();
@@ -304,10 +281,9 @@ mod tests {
             "gap.min(0.0)",
             "(-gap).max(0.0)",
         ];
-        let elsewhere = library().into_iter().filter(|(name, _)| name != "src/constraint/law.rs");
+        let elsewhere = sources().into_iter().filter(|(name, _)| name != "src/constraint/law.rs");
         for (name, code) in elsewhere {
-            let code = code.lines().filter(|line| !line.trim_start().starts_with("//"));
-            for line in code {
+            for line in code.lines() {
                 assert!(!words.iter().any(|word| contains(line, word)), "{name}: {line}");
             }
         }

@@ -1,7 +1,8 @@
 //! Total FETI: the dual of a torn problem.
 //!
 //! Notation of the paper: `K` block diagonal stiffness, `B` constraint rows, `R` rigid modes, `G = R'B'`,
-//! `F = B K^+ B'`, `P` the projector onto `Ker G`. Four rooms, from the ground up, and none knows of optimisation:
+//! `F = B K^+ B'`, `P` the projector onto `Ker G`. Four rooms, from the ground up. None knows of quadratic programs; of
+//! [`crate::qp`] they take nonnegative least squares, for what contacts can hold:
 //!
 //! - [`inverse`]: `R` and `K^+` of each subdomain, and which factors are kept;
 //! - [`dual`]: `B`, `F`, and inner products of multipliers;
