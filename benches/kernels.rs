@@ -9,8 +9,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use fetiplast::comm::solo::Solo;
 use fetiplast::kernels::{
-    Analysis, Coarse, Factor, Factors, Interconnection, Lower, Precision, Region, Schur, Subdomain, Workspace, analyse,
-    stiffness,
+    Analysis, Coarse, CoarseFace, Factor, Factors, Interconnection, Lower, Precision, Region, Schur, Subdomain,
+    Workspace, analyse, stiffness,
 };
 use fetiplast::model::{self, Discrete};
 use fetiplast::scene::Scene;
@@ -170,20 +170,16 @@ fn coarse(side: usize) {
     coarse.factorise().expect("supports hold both bodies");
     let setup = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let again = coarse.restricted(|_| true).expect("supports hold both bodies");
+    let again = CoarseFace::new(&coarse, vec![true; constraints.rows.len()]);
     let restricted = start.elapsed().as_secs_f64();
     let mut a = vec![1.0; 6 * subdomains.len()];
     let solve = best(10, || coarse.solve(&mut a));
     let mut rows = vec![1.0; constraints.rows.len()];
-    let project = best(10, || {
-        let mut a = coarse.apply(&rows);
-        coarse.solve(&mut a);
-        coarse.add_transpose(-1.0, &a, &mut rows);
-    });
+    let project = best(10, || again.project(&coarse, &mut rows));
     println!(
         "{}",
         json!({
-            "kind": "coarse", "subdomains": subdomains.len(), "rows": rows.len(), "length": again.length(),
+            "kind": "coarse", "subdomains": subdomains.len(), "rows": rows.len(), "length": coarse.factor_length(),
             "setup": setup, "restricted": restricted, "solve": solve, "projection": project,
         })
     );

@@ -107,6 +107,7 @@ pub mod kernels {
     pub use crate::assembly::{Region, stiffness};
     pub use crate::decomposition::Subdomain;
     pub use crate::feti::coarse::Coarse;
+    pub use crate::feti::coarse::face::CoarseFace;
     pub use crate::feti::dual::Interconnection;
     pub use crate::feti::inverse::factor::{Factors, analyse};
     pub use crate::feti::inverse::schur::Schur;

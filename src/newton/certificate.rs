@@ -174,22 +174,12 @@ impl StepSolver<'_> {
         let laws = problem.constraints.laws();
         let largest = |mine: f64| problem.space.maximum(mine);
         let mut lambda = lambda.to_vec();
-        for attempt in 0..BALANCINGS {
+        for _ in 0..BALANCINGS {
             laws.project(&mut lambda);
             let most = largest(problem.of_contact(&lambda).iter().fold(0.0, |most, l| most.max(l.abs())));
             let missing: Vec<f64> = wanted.iter().zip(coarse.apply(&lambda)).map(|(e, g)| e - g).collect();
-            let fresh;
-            // The rows of the last step have a factor.
-            let face = match self.programs.face().filter(|_| attempt == 0) {
-                Some(face) => face,
-                None => {
-                    match CoarseFace::new(coarse, laws.kept(&lambda, ROUNDING * most)) {
-                        Ok(face) => fresh = face,
-                        Err(_) => return (lambda, false),
-                    }
-                    &fresh
-                }
-            };
+            // The equalities balance what they can.
+            let face = CoarseFace::loose(coarse, laws.kept(&lambda, ROUNDING * most));
             face.add_balance(coarse, missing, &mut lambda);
             if largest(laws.distance(&lambda)) <= ROUNDING * most {
                 let norm = |squares: f64| squares.sqrt();

@@ -1,10 +1,11 @@
 //! The dual problem in the words of the QP solvers: inner products, and `F`, `P`, `M` as one quadratic function, on all
-//! rows or on those of an active set.
+//! rows ([`WholeDual`]) or on those of an active set ([`DualFace`]).
 
 use crate::constraint::Constraints;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::motion;
+use crate::feti::coarse::projector::Projector;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::preconditioner::Preconditioner;
@@ -25,11 +26,11 @@ impl Space for Multipliers<'_> {
     }
 }
 
-/// `F`, `P` and the preconditioner at one tangent.
+/// `F` and the preconditioner at one tangent, and the coarse problem.
 pub struct Dual<'s, 'a> {
     /// `F`.
     pub operator: &'s mut DualOperator<'a>,
-    /// `P`, and motions of bodies.
+    /// `G`, and motions of bodies.
     pub coarse: &'s Coarse<'a>,
     /// `M`.
     pub preconditioner: Option<&'s mut Preconditioner<'a>>,
@@ -54,43 +55,62 @@ impl<'a> Dual<'_, 'a> {
         }
     }
 
-    /// Contributions of each own subdomain to `x'x`, to the products of `x` with each of `against`, and to those of `pairs`; and
-    /// the number of products.
-    fn partial(&self, x: &[f64], against: &[&[f64]], pairs: &[(&[f64], &[f64])]) -> (Vec<f64>, usize) {
-        let mut all = vec![(x, x)];
-        all.extend(against.iter().map(|other| (x, *other)));
-        all.extend(pairs);
-        (self.timer.time("inner products", || self.space.partial(&all)), all.len())
-    }
-}
-
-impl Quadratic for Dual<'_, '_> {
+    /// `y = F x`.
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.timer.time("dual operator", || self.operator.apply(x, y));
         self.timer.count("dual operator", 0.0, self.operator.inverse.bytes_per_solve());
         (self.alive)(self.operator.applications());
     }
 
-    fn project(&mut self, x: &mut [f64]) {
-        self.timer.time("coarse problem", || self.coarse.project(x));
-    }
-
-    fn project_with_products(
-        &mut self,
-        _: &dyn Space,
-        x: &mut [f64],
-        against: &[&[f64]],
-        pairs: &[(&[f64], &[f64])],
-    ) -> (f64, Vec<f64>) {
-        let (partial, width) = self.partial(x, against, pairs);
-        self.timer.time("coarse problem", || self.coarse.project_with_sums(x, &partial, width))
-    }
-
+    /// `z = M r`; false if there is no preconditioner.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         let Some(preconditioner) = &mut self.preconditioner else { return false };
         self.timer.time("preconditioner", || preconditioner.apply(r, z));
         self.timer.count("preconditioner", 0.0, preconditioner.bytes_per_apply());
         true
+    }
+
+    /// Contributions of each own subdomain to `x'x` and `x'r`, to the products of `x` with each of `against`, and to those of
+    /// `pairs`; and the number of products.
+    fn partial(&self, (x, r): (&[f64], &[f64]), against: &[&[f64]], pairs: &[(&[f64], &[f64])]) -> (Vec<f64>, usize) {
+        let mut all = vec![(x, x), (x, r)];
+        all.extend(against.iter().map(|other| (x, *other)));
+        all.extend(pairs);
+        (self.timer.time("inner products", || self.space.partial(&all)), all.len())
+    }
+}
+
+/// The dual problem on all rows, for solvers that want an orthogonal projector.
+pub struct WholeDual<'s, 'a> {
+    /// `F` and the preconditioner.
+    pub dual: Dual<'s, 'a>,
+    /// `P`.
+    pub projector: Projector<'s, 'a>,
+}
+
+impl Quadratic for WholeDual<'_, '_> {
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.dual.apply(x, y);
+    }
+
+    fn project(&mut self, x: &mut [f64]) {
+        self.dual.timer.time("coarse problem", || self.projector.project(x));
+    }
+
+    fn reduce_with_products(
+        &mut self,
+        _: &dyn Space,
+        x: &mut [f64],
+        r: &[f64],
+        against: &[&[f64]],
+        pairs: &[(&[f64], &[f64])],
+    ) -> ([f64; 2], Vec<f64>) {
+        let (partial, width) = self.dual.partial((x, r), against, pairs);
+        self.dual.timer.time("coarse problem", || self.projector.project_with_sums(x, &partial, width))
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
+        self.dual.precondition(r, z)
     }
 }
 
@@ -126,10 +146,7 @@ impl DualFace<'_, '_> {
             if self.dual.space.maximum(joined) == 0.0 {
                 return false;
             }
-            match CoarseFace::new(self.dual.coarse, kept.to_vec()) {
-                Ok(rows) => self.rows = rows,
-                Err(_) => return false,
-            }
+            self.rows = self.rows.with(self.dual.coarse, self.dual.space, kept.to_vec());
         }
         true
     }
@@ -144,16 +161,21 @@ impl Quadratic for DualFace<'_, '_> {
         self.dual.timer.time("coarse problem", || self.rows.project(self.dual.coarse, x));
     }
 
-    fn project_with_products(
+    fn reduce(&mut self, r: &mut [f64]) {
+        self.dual.timer.time("coarse problem", || self.rows.reduce(self.dual.coarse, r));
+    }
+
+    fn reduce_with_products(
         &mut self,
         _: &dyn Space,
         x: &mut [f64],
+        r: &[f64],
         against: &[&[f64]],
         pairs: &[(&[f64], &[f64])],
-    ) -> (f64, Vec<f64>) {
+    ) -> ([f64; 2], Vec<f64>) {
         self.rows.mask(x);
-        let (partial, width) = self.dual.partial(x, against, pairs);
-        self.dual.timer.time("coarse problem", || self.rows.project_with_sums(self.dual.coarse, x, &partial, width))
+        let (partial, width) = self.dual.partial((x, r), against, pairs);
+        self.dual.timer.time("coarse problem", || self.rows.reduce_with_sums(self.dual.coarse, (x, r), &partial, width))
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
@@ -164,10 +186,8 @@ impl Quadratic for DualFace<'_, '_> {
 impl Face for DualFace<'_, '_> {
     fn restrict(&mut self, kept: &mut [bool]) -> bool {
         let timer = self.dual.timer;
-        match timer.time("coarse set-up", || CoarseFace::new(self.dual.coarse, kept.to_vec())) {
-            Ok(rows) => self.rows = rows,
-            Err(_) => return false,
-        }
+        let Dual { coarse, space, .. } = self.dual;
+        self.rows = timer.time("coarse set-up", || self.rows.with(coarse, space, kept.to_vec()));
         let complete = timer.time("coarse set-up", || self.complete(kept));
         self.dual.restrict_scaling(self.constraints, kept);
         complete

@@ -5,7 +5,7 @@
 //! `d - F l0 = B K^+ (f_k - B'l0) - c_k` costs one application of F. Without inequalities PCPG solves it. With them the
 //! active set does, and where its sets come back SMALSE-M, on the homogeneous problem of `l - l0`.
 
-use super::dual::{Dual, DualFace, Multipliers};
+use super::dual::{Dual, DualFace, Multipliers, WholeDual};
 use super::forcing::Forcing;
 use super::problem::TornProblem;
 use crate::feti::coarse::face::CoarseFace;
@@ -97,30 +97,27 @@ impl Programs {
         self.face = None;
     }
 
-    /// The next program starts with these rows kept; from scratch if they leave a rigid motion of a part of a body free.
-    /// Collective.
+    /// The next program starts with these rows kept. Collective.
     pub fn expect(&mut self, coarse: &Coarse, kept: Vec<bool>) {
-        self.face = CoarseFace::new(coarse, kept).ok();
+        self.face = Some(CoarseFace::new(coarse, kept));
     }
 
-    /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch. `resultants` are
-    /// `e = R'f_k`: forces and moments on all clusters, whole on every rank. Collective.
+    /// Multipliers with `G l = e` next to the `last` ones; those that use contacts least if the program starts from scratch.
+    /// `resultants` are `e = R'f_k`: forces and moments on all clusters, whole on every rank. Collective.
     pub fn start(&self, coarse: &Coarse, last: &[f64], resultants: &[f64]) -> Vec<f64> {
+        let all = |coarse| CoarseFace::loose(coarse, vec![true; last.len()]);
+        let mut lambda = vec![0.0; last.len()];
         let Some(face) = &self.face else {
-            let mut lambda = vec![0.0; last.len()];
-            coarse.particular(resultants, &mut lambda);
+            all(coarse).add_balance(coarse, resultants.to_vec(), &mut lambda);
             return lambda;
         };
-        let mut lambda = last.to_vec();
+        lambda.copy_from_slice(last);
         let missing: Vec<f64> = resultants.iter().zip(coarse.apply(&lambda)).map(|(e, b)| e - b).collect();
         let size = resultants.iter().map(|e| e * e).sum::<f64>().sqrt();
-        if face.unbalanced(&missing, size).is_none() {
-            // Open contacts stay open.
-            face.add_balance(coarse, missing, &mut lambda);
-        } else {
-            let mut change = vec![0.0; last.len()];
-            coarse.particular(&missing, &mut change);
-            lambda.iter_mut().zip(change).for_each(|(l, c)| *l += c);
+        // Open contacts stay open where that can be.
+        match face.unbalanced(&missing, size) {
+            None => face.add_balance(coarse, missing, &mut lambda),
+            Some(_) => all(coarse).add_balance(coarse, missing, &mut lambda),
         }
         lambda
     }
@@ -145,11 +142,11 @@ impl Programs {
             products: self.settings.products,
         };
         if !problem.constraints.has_inequalities {
-            return self.equalities(problem, dual, lambda, b, limits);
+            return Ok(self.equalities(problem, dual, resultants, (lambda, b), limits));
         }
         let mut wasted = Statistics::default();
         if self.settings.method == Qp::ActiveSet {
-            let found = self.active_set(problem, &mut dual, resultants, (lambda.clone(), b.clone()), limits)?;
+            let found = self.active_set(problem, &mut dual, resultants, (lambda.clone(), b.clone()), limits);
             if found.outcome != Outcome::Cycled {
                 return Ok(found);
             }
@@ -167,27 +164,26 @@ impl Programs {
     }
 
     /// The rows that the last program kept; all rows if there was none.
-    fn take_face(&mut self, coarse: &Coarse, rows: usize) -> Result<CoarseFace, Floating> {
-        match self.face.take() {
-            Some(face) => Ok(face),
-            None => CoarseFace::new(coarse, vec![true; rows]),
-        }
+    fn take_face(&mut self, coarse: &Coarse, rows: usize) -> CoarseFace {
+        self.face.take().unwrap_or_else(|| CoarseFace::loose(coarse, vec![true; rows]))
     }
 
     fn equalities(
         &mut self,
         problem: &TornProblem,
-        mut dual: Dual,
-        mut lambda: Vec<f64>,
-        mut residual: Vec<f64>,
+        dual: Dual,
+        resultants: &[f64],
+        (mut lambda, mut residual): (Vec<f64>, Vec<f64>),
         limits: Limits,
-    ) -> Result<DualSolution, Floating> {
+    ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
-        let report = Pcpg::new(&space).solve(&mut dual, &mut lambda, &mut residual, &limits);
+        let rows = self.take_face(dual.coarse, lambda.len());
+        let mut face = DualFace { dual, constraints: problem.constraints, resultants, rows };
+        let report = Pcpg::new(&space).solve(&mut face, &mut lambda, &mut residual, &limits);
+        self.face = Some(face.rows);
         let at_floor = self.note(&limits, report.first_norm);
-        self.face = Some(self.take_face(dual.coarse, lambda.len())?);
         let (outcome, statistics) = (report.outcome, report.statistics);
-        Ok(DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor })
+        DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor }
     }
 
     fn active_set(
@@ -197,15 +193,15 @@ impl Programs {
         resultants: &[f64],
         (x, residual): (Vec<f64>, Vec<f64>),
         limits: Limits,
-    ) -> Result<DualSolution, Floating> {
+    ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
         let bounded = problem.constraints.laws().may_open();
-        let rows = self.take_face(dual.coarse, bounded.len())?;
+        let rows = self.take_face(dual.coarse, bounded.len());
         let mut kept = rows.kept().to_vec();
         let mut face = DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants, rows };
         if !face.complete(&mut kept) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
-            return Ok(DualSolution { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false });
+            return DualSolution { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false };
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
         let start = active_set::Guess { x, residual, kept, uneven: problem.constraints.uneven };
@@ -214,22 +210,25 @@ impl Programs {
         let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;
         let mut lambda = balanced.clone();
         problem.constraints.laws().project(&mut lambda);
-        self.face = Some(face.rows);
-        Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor })
+        let DualFace { dual, rows, .. } = face;
+        self.face = Some(dual.timer.time("coarse set-up", || rows.settled(dual.coarse)));
+        DualSolution { lambda, balanced, outcome, statistics, at_floor }
     }
 
     fn smalse(
         &mut self,
         problem: &TornProblem,
-        mut dual: Dual,
+        dual: Dual,
         start: Vec<f64>,
         b: Vec<f64>,
         limits: Limits,
     ) -> Result<DualSolution, Floating> {
         let (timer, coarse) = (dual.timer, dual.coarse);
         let space = Multipliers(problem.space, timer);
+        let projector = timer.time("coarse set-up", || coarse.projector())?;
+        let mut dual = WholeDual { dual, projector };
         let mut projected = b.clone();
-        let mean = timer.time("coarse problem", || coarse.project(&mut projected));
+        let mean = timer.time("coarse problem", || projector.project(&mut projected));
         let mut statistics = Statistics::default();
         let (mut x, mut outcome, mut at_floor) = (vec![0.0; b.len()], Outcome::Converged, true);
         if space.norm(&projected) != 0.0 {
@@ -263,7 +262,7 @@ impl Programs {
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         let kept = problem.constraints.laws().kept(&lambda, 0.0);
-        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(coarse, kept))?);
+        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(coarse, kept)));
         Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor })
     }
 

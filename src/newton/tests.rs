@@ -133,9 +133,10 @@ fn the_energy_falls_in_every_step_and_the_end_is_quadratic() {
     let energies = energies(&summary);
     let noise = 1e-13 * energies[0].abs();
     assert!(energies.windows(2).all(|e| e[1] <= e[0] + noise), "{energies:?}");
-    // Once the plastic elements are found, the residual falls at least with the power that the inner accuracy allows.
-    let [.., before, last] = &summary.newton[..] else { panic!() };
-    assert!(last.residual < 1e-3 * before.residual || last.residual < 1e-13, "{:?}", summary.newton);
+    // Once the plastic elements are found, the residual falls at least with the power that the inner accuracy allows, down to rounding.
+    let residuals: Vec<f64> = summary.newton.iter().map(|row| row.residual).collect();
+    let found: Vec<&[f64]> = residuals.windows(2).filter(|pair| pair[0] < 1e-4 && pair[0] > 1e-10).collect();
+    assert!(!found.is_empty() && found.iter().all(|pair| pair[1] < 1e-3 * pair[0]), "{:?}", summary.newton);
 }
 
 #[test]

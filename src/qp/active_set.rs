@@ -36,8 +36,8 @@ pub trait Face: Quadratic {
     /// Moves x to the nearest point of { G x = e, x = 0 off the kept rows }.
     fn restore(&mut self, x: &mut [f64]);
 
-    /// Replaces `residual` = d - A x by residual - G'a, with the a that makes this smallest on the kept rows. Positive
-    /// entries are violated gaps.
+    /// Replaces `residual` = d - A x by residual - G'a, with an a that makes this vanish on the kept rows if x is the solution there.
+    /// Positive entries are violated gaps.
     fn gaps(&mut self, residual: &mut [f64]);
 }
 
@@ -176,7 +176,7 @@ impl Run<'_> {
 
     fn projected_norm(&mut self, face: &mut dyn Face) -> f64 {
         self.work.copy_from_slice(&self.residual);
-        face.project(&mut self.work);
+        face.reduce(&mut self.work);
         self.space.norm(&self.work)
     }
 

@@ -1,13 +1,13 @@
 //! Projected preconditioned conjugate gradients: min 1/2 x'A x - x'b over x in x0 + Ker G, no bounds.
 //!
-//! Farhat, Lesoinne and Pierson, Numer. Linear Algebra Appl. 7 (2000). Every direction is P M P r, orthogonalised in the
+//! Farhat, Lesoinne and Pierson, Numer. Linear Algebra Appl. 7 (2000). Every direction is P M P'r, orthogonalised in the
 //! A-inner product against *all* kept directions: at some dozens of iterations this costs little next to the products
 //! and restores the convergence that round-off takes. To keep some rows zero, let P map onto vectors that are zero there:
 //! then all directions are.
 //!
 //! The residual b - A x is carried *unprojected*, so that a caller can change P or move x and go on from it. The projected
-//! residual and its norm are carried by recurrences. An iteration has three collectives: for P M P r, for the kept
-//! directions, and for P A p with all other inner products.
+//! residual and its norm are carried by recurrences. An iteration has three collectives: for P M P'r, for the kept
+//! directions, and for P'A p with all other inner products.
 
 use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics, axpy};
@@ -25,9 +25,9 @@ pub struct Report {
     pub outcome: Outcome,
     /// What it took; CG steps and products are as many as iterations.
     pub statistics: Statistics,
-    /// Norm of P r at the start.
+    /// Norm of P'r at the start.
     pub first_norm: f64,
-    /// Norm of P r at the end.
+    /// Norm of P'r at the end.
     pub norm: f64,
 }
 
@@ -40,7 +40,7 @@ struct Direction {
 
 /// The projected residual, carried on by recurrences.
 struct Inside {
-    /// P r.
+    /// P'r.
     residual: Vec<f64>,
     /// Its squared norm; the recurrence rounds relative to where it began.
     square: f64,
@@ -52,13 +52,13 @@ impl Inside {
     /// Projects and measures a residual.
     fn of(space: &dyn Space, function: &mut dyn Quadratic, residual: &[f64]) -> Self {
         let mut residual = residual.to_vec();
-        function.project(&mut residual);
+        function.reduce(&mut residual);
         let square = space.dot(&residual, &residual);
         Self { residual, square, measured: square }
     }
 
-    /// Takes `step` times `P A p` away, given its squared norm and its product with the residual.
-    fn advance(&mut self, step: f64, projected: &[f64], (square_ap, change): (f64, f64)) {
+    /// Takes `step` times `P'A p` away, given its squared norm and its product with the residual.
+    fn advance(&mut self, step: f64, projected: &[f64], [square_ap, change]: [f64; 2]) {
         axpy(-step, projected, &mut self.residual);
         self.square += step * (step * square_ap - 2.0 * change);
         if self.square < 0.0 {
@@ -100,7 +100,7 @@ impl<'a> Pcpg<'a> {
         let mut inside = Inside::of(self.space, function, residual);
         let first_norm = inside.square.sqrt();
         loop {
-            // Stopping tests by |P r|, which is measured before it is believed.
+            // Stopping tests by |P'r|, which is measured before it is believed.
             let norm = inside.square.sqrt();
             let report = |outcome, statistics| Report { outcome, statistics, first_norm, norm };
             if !norm.is_finite() {
@@ -118,21 +118,22 @@ impl<'a> Pcpg<'a> {
                 return report(Outcome::LimitReached, statistics);
             }
 
-            // The direction p = P M P r, A-orthogonal to all kept ones, and its product.
+            // The direction p = P M P'r, A-orthogonal to all kept ones, and its product.
             let p = self.direction(function, &inside.residual, &mut statistics);
             let mut ap = vec![0.0; p.len()];
             function.apply(&p, &mut ap);
             statistics.hessian += 1;
 
-            // The step p'P r / p'A p, with the products that the norm of the next P r follows from.
+            // The step p'P'r / p'A p, with the products that the norm of the next P'r follows from.
             let mut projected = ap.clone();
-            let (square_ap, d) = function.project_with_products(
+            let (of_image, d) = function.reduce_with_products(
                 self.space,
                 &mut projected,
-                &[&p, &inside.residual],
+                &inside.residual,
+                &[&p],
                 &[(&p, &inside.residual)],
             );
-            let [curvature, change, slope] = d[..] else { unreachable!("three products were asked for") };
+            let [curvature, slope] = d[..] else { unreachable!("two products were asked for") };
             if !(curvature.is_finite() && slope.is_finite()) {
                 return report(Outcome::NotFinite, statistics);
             }
@@ -142,7 +143,7 @@ impl<'a> Pcpg<'a> {
             let step = slope / curvature;
             axpy(step, &p, x);
             axpy(-step, &ap, residual);
-            inside.advance(step, &projected, (square_ap, change));
+            inside.advance(step, &projected, of_image);
             statistics.cg += 1;
             self.keep(Direction { p, ap, curvature });
         }
@@ -153,11 +154,11 @@ impl<'a> Pcpg<'a> {
     fn direction(&self, function: &mut dyn Quadratic, r: &[f64], statistics: &mut Statistics) -> Vec<f64> {
         let mut z = vec![0.0; r.len()];
         if function.precondition(r, &mut z) {
-            function.project(&mut z);
             statistics.preconditioner += 1;
         } else {
             z.copy_from_slice(r);
         }
+        function.project(&mut z);
         let pairs: Vec<_> = self.kept.iter().map(|d| (&z[..], &d.ap[..])).collect();
         if pairs.is_empty() {
             return z;

@@ -22,8 +22,9 @@ pub trait Space {
     }
 }
 
-/// A quadratic function on the null space of the equality constraints `G x = 0`: its symmetric positive semidefinite matrix A, the
-/// orthogonal projector P onto that space and, if there is one, a preconditioner M.
+/// A quadratic function on the null space of the equality constraints `G x = 0`: its symmetric positive semidefinite matrix A, a
+/// projector P onto that space, which is orthogonal unless [`Quadratic::reduce`] says otherwise, and, if there is one, a
+/// preconditioner M.
 pub trait Quadratic {
     /// `y = A x`.
     fn apply(&mut self, x: &[f64], y: &mut [f64]);
@@ -31,22 +32,28 @@ pub trait Quadratic {
     /// `x = P x`, in place.
     fn project(&mut self, x: &mut [f64]);
 
-    /// Sets `x = P x`. Returns `|P x|^2`, and inner products: of the unprojected `x` with each of `against`, then of
-    /// `pairs`. To be overridden where one collective can do all.
-    fn project_with_products(
+    /// `r = P' r`, in place: what a gradient is on the null space.
+    fn reduce(&mut self, r: &mut [f64]) {
+        self.project(r);
+    }
+
+    /// Sets `x = P' x`. Returns `|P' x|^2`, `r'P' x` with an `r = P' r`, and inner products: of the unprojected `x` with each
+    /// of `against`, then of `pairs`. To be overridden where one collective can do all.
+    fn reduce_with_products(
         &mut self,
         space: &dyn Space,
         x: &mut [f64],
+        r: &[f64],
         against: &[&[f64]],
         pairs: &[(&[f64], &[f64])],
-    ) -> (f64, Vec<f64>) {
+    ) -> ([f64; 2], Vec<f64>) {
         let before = x.to_vec();
-        self.project(x);
-        let mut all: Vec<(&[f64], &[f64])> = vec![(x, x)];
+        self.reduce(x);
+        let mut all: Vec<(&[f64], &[f64])> = vec![(x, x), (x, r)];
         all.extend(against.iter().map(|y| (&before[..], *y)));
         all.extend(pairs);
-        let mut products = space.dots(&all);
-        (products.remove(0), products)
+        let products = space.dots(&all);
+        ([products[0], products[1]], products[2..].to_vec())
     }
 
     /// `z = M r` with M an approximate inverse of A, symmetric and positive on Ker G; returns false, and leaves `z`

@@ -245,7 +245,7 @@ mod tests {
         let free = |sets: &[&str]| {
             let described = |setup: &crate::fixture::Setup| {
                 let coarse = setup.bare_coarse();
-                let free = coarse.free(|row| setup.rows()[row].law().always_holds());
+                let free = coarse.free();
                 let name = |motion: &Vec<f64>| {
                     let (body, _, motion) = coarse.motions().describe(motion);
                     format!("{body}: {motion}")

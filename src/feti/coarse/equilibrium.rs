@@ -49,7 +49,7 @@ pub fn check(
 ) -> Result<(), Box<Unheld>> {
     let is_contact = |row: usize| !constraints.rows[row].law().always_holds();
     let motions = coarse.motions();
-    let free = coarse.free(|row| !is_contact(row));
+    let free = coarse.free();
     if free.is_empty() {
         return Ok(());
     }

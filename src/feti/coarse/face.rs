@@ -1,53 +1,101 @@
 //! The coarse problem of some rows only: the equalities and the contacts that are closed.
 //!
-//! With `I_A` the mask of these rows it knows `G_A = G I_A`, the factor of `G_A G_A'` and the projector
-//! `P_A = I_A - G_A'(G_A G_A')^-1 G_A` onto what keeps the balance and leaves open contacts without force.
+//! It is built on the factor of a base `B` of kept rows ([`super::base`]), all equalities among them. The base balances all but the
+//! motions `N` of whole bodies that it leaves free; these the other kept contacts `X` balance. With `G_A` the columns of all kept
+//! rows, `Z` a generalised inverse of `N'G_X G_X'N` and `S^+` that of `G_B G_B'`,
 //!
-//! These rows may leave rigid motions `N` of whole bodies free (`G_A'N = 0`). Then the first cluster of each body is
-//! tied: with `C` the rows of `N` there, scaled by body, `(G_A G_A' + C C')^-1` is a generalised inverse of `G_A G_A'`, exact for all
-//! right-hand sides orthogonal to `N`, since `N'C C'a = 0` leaves `C'a = 0`.
+//! ```text
+//! L  = I_B G_B' S^+ (I - G_X G_X' N Z N') + I_X G_X' N Z N'      G_A L = I on forces that the kept rows can balance
+//! P  = I_A - L G_A                                               P x:   in balance, and zero where contacts are open
+//! P' = I_A - G_A' L'                                             P' r:  without the rigid motions that r tells
+//! ```
+//!
+//! `P` is a projector onto the vectors `x` of the face with `G_A x = 0`, and an orthogonal one where all kept rows are in the base;
+//! gradients are projected by its transpose. The base of all kept rows takes the fewest iterations, by a tenth to a quarter. A
+//! base that is there already takes no factor. So where there are few clusters every set of rows is a base. Where there are many,
+//! the rows that a Newton step begins with are one, and once a contact of them opens the equalities are the base.
 
-use super::bodies::BodyMotions;
-use super::factor::{Blocks, CoarseFactor};
-use super::{Coarse, Floating};
+use std::rc::Rc;
+
+use faer::prelude::Solve;
+use faer::{ColRef, Mat};
+
+use super::Coarse;
+use super::base::Base;
+use super::factor::Blocks;
+use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
+use crate::span::complement;
 use crate::vector::{dot, length};
 
-/// The kept rows with their factor.
+/// So many clusters are few: their factor takes some milliseconds.
+const FEW: usize = 250;
+
+/// The kept rows.
 pub struct CoarseFace {
     kept: Vec<bool>,
     /// Rows that are not.
     dropped: Vec<u32>,
-    factor: CoarseFactor,
-    /// `N`, six numbers a cluster.
+    base: Rc<Base>,
+    /// `G_X G_X'`.
+    contacts: Blocks,
+    /// What contacts outside the base hold of whole bodies; `None` where the base holds all.
+    held: Option<Held>,
+    /// Motions of whole bodies that nothing holds, six numbers a cluster.
     free: Vec<Vec<f64>>,
 }
 
+/// Motions `N` of whole bodies that the base leaves free, of which other contacts hold some.
+struct Held {
+    /// `G_X G_X' N`, six numbers a cluster.
+    pressed: Vec<Vec<f64>>,
+    /// `Z`.
+    inverse: Mat<f64>,
+}
+
 impl CoarseFace {
-    /// Of the rows that are kept. Collective.
-    ///
-    /// # Errors
-    /// If these rows leave a motion free that is not one of whole bodies.
-    pub fn new(coarse: &Coarse, kept: Vec<bool>) -> Result<Self, Floating> {
-        let motions = coarse.motions();
-        coarse
-            .restricted(|row| kept[row])
-            .map(|factor| (factor, Vec::new()))
-            .or_else(|floating| {
-                let free = coarse.free(|row| kept[row]);
-                if free.is_empty() {
-                    return Err(floating);
-                }
-                let free: Vec<Vec<f64>> = free.iter().map(|motion| motions.amplitudes(motion)).collect();
-                let tied = |blocks| tied(motions, &free, blocks);
-                let factor = coarse
-                    .factor_of(&tied(coarse.blocks(|row| kept[row])), || tied(coarse.unit_blocks(|row| kept[row])));
-                factor.map(|factor| (factor, free))
-            })
-            .map(|(factor, free)| {
-                let dropped = (0..).zip(&kept).filter(|(_, kept)| !**kept).map(|(row, _)| row).collect();
-                Self { kept, dropped, factor, free }
-            })
+    /// Of the rows that are kept, all equalities among them; all are in the base. Collective.
+    pub fn new(coarse: &Coarse, kept: Vec<bool>) -> Self {
+        let base = match coarse.has_contacts(&kept) {
+            // Parts of a body may hang on equalities and contacts that the base as a whole does not hold.
+            true => Base::new(coarse, &kept).map_or_else(|_| Rc::clone(coarse.base()), Rc::new),
+            false => Rc::clone(coarse.base()),
+        };
+        Self::on(coarse, base, kept)
+    }
+
+    /// Of the rows that are kept, only the equalities being in the base. Collective.
+    pub fn loose(coarse: &Coarse, kept: Vec<bool>) -> Self {
+        Self::on(coarse, Rc::clone(coarse.base()), kept)
+    }
+
+    /// Of other rows, for a short while: on the base that is there, or, if that has lost a row, on that of the equalities. Collective.
+    pub fn with(&self, coarse: &Coarse, space: &RowSpace, kept: Vec<bool>) -> Self {
+        if coarse.clusters() <= FEW {
+            return Self::new(coarse, kept);
+        }
+        let is_lost = |(row, kept): (usize, &bool)| self.base.has_contact(row) && !kept;
+        let lost = kept.iter().enumerate().any(is_lost);
+        let base = if space.maximum(f64::from(lost)) > 0.0 { coarse.base() } else { &self.base };
+        Self::on(coarse, Rc::clone(base), kept)
+    }
+
+    /// Of the same rows, all in the base. Collective.
+    pub fn settled(self, coarse: &Coarse) -> Self {
+        if self.contacts.is_empty() { self } else { Self::new(coarse, self.kept) }
+    }
+
+    fn on(coarse: &Coarse, base: Rc<Base>, kept: Vec<bool>) -> Self {
+        let [contacts, unit] = coarse.contact_blocks(|row| kept[row] && !base.has_contact(row));
+        let (held, free) = match base.free() {
+            [] => (None, Vec::new()),
+            motions => {
+                let (held, free) = Held::new(motions, &contacts, &unit);
+                (Some(held), free)
+            }
+        };
+        let dropped = (0..).zip(&kept).filter(|(_, kept)| !**kept).map(|(row, _)| row).collect();
+        Self { kept, dropped, base, contacts, held, free }
     }
 
     /// Rigid motions of whole bodies that the kept rows leave free, six numbers a cluster.
@@ -60,13 +108,7 @@ impl CoarseFace {
     pub fn unbalanced(&self, e: &[f64], size: f64) -> Option<Vec<f64>> {
         let along: Vec<f64> = self.free.iter().map(|motion| dot(motion, e)).collect();
         let real = self.free.iter().zip(&along).any(|(motion, along)| along.abs() > BALANCED * size * length(motion));
-        real.then(|| {
-            let mut motion = vec![0.0; e.len()];
-            for (mode, along) in self.free.iter().zip(along) {
-                motion.iter_mut().zip(mode).for_each(|(m, x)| *m += along * x);
-            }
-            motion
-        })
+        real.then(|| combination(&self.free, &along))
     }
 
     /// Which rows are kept.
@@ -79,196 +121,153 @@ impl CoarseFace {
         self.dropped.iter().for_each(|&row| rows[row as usize] = 0.0);
     }
 
-    /// The amplitudes `a` that make `rows - G'a` smallest on the kept rows. One all-gather.
+    /// `rows = P rows`. One all-gather.
+    pub fn project(&self, coarse: &Coarse, rows: &mut [f64]) {
+        self.mask(rows);
+        let e = coarse.apply(rows);
+        self.subtract_balance(coarse, e, rows);
+    }
+
+    /// `rows = P' rows`. One all-gather.
+    pub fn reduce(&self, coarse: &Coarse, rows: &mut [f64]) {
+        self.mask(rows);
+        let (parts, _) = coarse.apply_each(&self.base, (rows, &[]), &[], 0);
+        coarse.add_transpose(-1.0, &self.motion(&parts), rows);
+        self.mask(rows);
+    }
+
+    /// As [`CoarseFace::reduce`] of rows `x` that are masked already. Returns `|P'x|^2` and `r'P'x` for an `r = P'r`, and sums over
+    /// all subdomains of `width` numbers for each own one, given and returned behind those of `x'x` and `x'r`. One all-gather.
+    pub fn reduce_with_sums(
+        &self,
+        coarse: &Coarse,
+        (x, r): (&mut [f64], &[f64]),
+        partial: &[f64],
+        width: usize,
+    ) -> ([f64; 2], Vec<f64>) {
+        let (parts, sums) = coarse.apply_each(&self.base, (x, r), partial, width);
+        let motion = self.motion(&parts);
+        coarse.add_transpose(-1.0, &motion, x);
+        self.mask(x);
+        // With v = L'x: |x - G_A'v|^2 = x'x - 2 v'G_A x + v'G_A G_A'v, where G_B G_B'v = G_B x; and G_B r = 0.
+        let [inside, contacts, beside] = &parts;
+        let resisted = dot(&motion, multiply(&self.contacts, &motion));
+        let square = sums[0] - dot(&motion, inside) - 2.0 * dot(&motion, contacts) + resisted;
+        let product = sums[1] - dot(&motion, beside);
+        // Not `max`: NaN must stay NaN.
+        ([if square < 0.0 { 0.0 } else { square }, product], sums[2..].to_vec())
+    }
+
+    /// The rigid motions `L'rows`, six numbers a cluster, that the kept rows themselves tell. One all-gather.
     pub fn amplitudes(&self, coarse: &Coarse, rows: &[f64]) -> Vec<f64> {
         let mut masked = rows.to_vec();
         self.mask(&mut masked);
-        let mut a = coarse.apply(&masked);
-        self.factor.solve(&mut a);
-        a
+        let (parts, _) = coarse.apply_each(&self.base, (&masked, &[]), &[], 0);
+        self.motion(&parts)
     }
 
-    /// `rows = P_A rows`. One all-gather.
-    pub fn project(&self, coarse: &Coarse, rows: &mut [f64]) {
-        self.mask(rows);
-        let mut a = coarse.apply(rows);
-        self.factor.solve(&mut a);
-        coarse.add_transpose(-1.0, &a, rows);
-        self.mask(rows);
-    }
-
-    /// As [`CoarseFace::project`] of rows that are masked already; returns the squared norm of `P_A rows`, and the sums over all
-    /// subdomains of `width` numbers for each own one, given and returned behind those of the square of `rows`. One all-gather.
-    pub fn project_with_sums(
-        &self,
-        coarse: &Coarse,
-        rows: &mut [f64],
-        partial: &[f64],
-        width: usize,
-    ) -> (f64, Vec<f64>) {
-        let (mut a, mut sums) = coarse.apply_with_sums(rows, partial, width);
-        let e = a.clone();
-        self.factor.solve(&mut a);
-        coarse.add_transpose(-1.0, &a, rows);
-        self.mask(rows);
-        (without(sums.remove(0), &e, &a), sums)
-    }
-
-    /// Adds to the kept rows the least that changes `G rows` by `e`. Local.
+    /// Changes `G rows` by `e` with the kept rows: `rows += L e`. Local.
     pub fn add_balance(&self, coarse: &Coarse, mut e: Vec<f64>, rows: &mut [f64]) {
-        self.factor.solve(&mut e);
-        let mut change = vec![0.0; rows.len()];
-        coarse.add_transpose(1.0, &e, &mut change);
-        for ((r, c), _) in rows.iter_mut().zip(change).zip(&self.kept).filter(|(_, kept)| **kept) {
-            *r += c;
+        e.iter_mut().for_each(|e| *e = -*e);
+        self.subtract_balance(coarse, e, rows);
+    }
+
+    /// `rows -= L e`. Local.
+    fn subtract_balance(&self, coarse: &Coarse, mut e: Vec<f64>, rows: &mut [f64]) {
+        if let Some(held) = &self.held {
+            let motions = self.base.free();
+            let shares = held.solve(&products(motions, &e));
+            let motion = combination(motions, &shares);
+            coarse.add_transpose_outside(&self.base, -1.0, &motion, rows);
+            self.mask(rows);
+            held.pressed.iter().zip(&shares).for_each(|(forces, share)| subtract(*share, forces, &mut e));
         }
+        self.base.solve(&mut e);
+        coarse.add_transpose_in(&self.base, -1.0, &e, rows);
+    }
+
+    /// `L'r` from `G_B r` and `G_X r`.
+    fn motion(&self, [inside, contacts, _]: &[Vec<f64>; 3]) -> Vec<f64> {
+        let mut motion = inside.clone();
+        self.base.solve(&mut motion);
+        let Some(held) = &self.held else { return motion };
+        let motions = self.base.free();
+        let left: Vec<f64> =
+            motions.iter().zip(&held.pressed).map(|(n, forces)| dot(n, contacts) - dot(forces, &motion)).collect();
+        let whole = combination(motions, &held.solve(&left));
+        motion.iter_mut().zip(whole).for_each(|(m, w)| *m += w);
+        motion
     }
 }
 
-/// `|P x|^2 = x'x - e'a` with `e = G x` and `a = (G G')^-1 e`.
-pub(super) fn without(square: f64, e: &[f64], a: &[f64]) -> f64 {
-    let rest = square - dot(e, a);
-    // Not `max`: NaN must stay NaN.
-    if rest < 0.0 { 0.0 } else { rest }
+impl Held {
+    /// Of motions and the blocks of the contacts, and those if all rows were unit vectors; also the motions that contacts do not hold.
+    fn new(motions: &[Vec<f64>], contacts: &Blocks, unit: &Blocks) -> (Self, Vec<Vec<f64>>) {
+        let k = motions.len();
+        // What contacts hold is a matter of directions, not of how long rows are.
+        let resisted: Vec<Vec<f64>> = motions.iter().map(|motion| products(motions, &multiply(unit, motion))).collect();
+        // Beside what the contacts resist most, in any direction, rounding is nothing.
+        let most = unit.values().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let rounding = NOTHING * most * motions.iter().map(|motion| dot(motion, motion)).fold(0.0, f64::max);
+        let real = |x: f64| if x.abs() > rounding { x } else { 0.0 };
+        let resisted: Vec<Vec<f64>> = resisted.iter().map(|row| row.iter().copied().map(real).collect()).collect();
+        let loose = complement(&resisted, k);
+        let firm = complement(&loose, k);
+        let pressed: Vec<Vec<f64>> = motions.iter().map(|motion| multiply(contacts, motion)).collect();
+        let basis = Mat::from_fn(k, firm.len(), |i, j| firm[j][i]);
+        let gram = Mat::from_fn(k, k, |i, j| dot(&motions[i], &pressed[j]));
+        let inner = basis.transpose() * gram * &basis;
+        let inverse = &basis * inner.partial_piv_lu().solve(basis.transpose());
+        let free = loose.iter().map(|shares| combination(motions, shares)).collect();
+        (Self { pressed, inverse }, free)
+    }
+
+    /// `Z x`.
+    fn solve(&self, x: &[f64]) -> Vec<f64> {
+        let shares = &self.inverse * ColRef::from_slice(x);
+        shares.iter().copied().collect()
+    }
 }
+
+/// Resistance smaller than this share of the most that rows of this length can do is rounding.
+const NOTHING: f64 = 1e-10;
 
 /// Forces along a free motion smaller than this share of all are rounding.
 const BALANCED: f64 = 1e-10;
 
-/// Adds `C C'` to the blocks. The rows of `N` at a body are scaled by the root of the largest entry of its block, so that `C'N` stays
-/// regular.
-fn tied(motions: &BodyMotions, free: &[Vec<f64>], mut blocks: Blocks) -> Blocks {
-    let first = motions.first_clusters();
-    let largest = |x: &[f64]| x.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
-    let any = blocks.values().map(|block| largest(block)).fold(0.0, f64::max);
-    // Nothing may hold a body.
-    let own =
-        |cluster: &usize| blocks.get(&(*cluster, *cluster)).map(|block| largest(block)).filter(|size| *size > 0.0);
-    let root = |cluster: &usize| own(cluster).unwrap_or(any).sqrt();
-    let roots: Vec<f64> = first.iter().map(root).collect();
-    for motion in free {
-        let of = |cluster: usize| &motion[MODES * cluster..][..MODES];
-        let scale = 1.0 / first.iter().map(|&cluster| largest(of(cluster))).fold(0.0, f64::max);
-        let parts = || first.iter().zip(&roots).filter(|(cluster, _)| of(**cluster).iter().any(|x| *x != 0.0));
-        for (&row, of_row) in parts() {
-            for (&column, of_column) in parts().filter(|(column, _)| **column <= row) {
-                let block = blocks.entry((row, column)).or_insert([0.0; MODES * MODES]);
-                for (i, a) in of(row).iter().enumerate() {
-                    for (j, b) in of(column).iter().enumerate() {
-                        block[MODES * i + j] += (of_row * scale * a) * (of_column * scale * b);
-                    }
+/// The products of `x` with some vectors.
+fn products(vectors: &[Vec<f64>], x: &[f64]) -> Vec<f64> {
+    vectors.iter().map(|vector| dot(vector, x)).collect()
+}
+
+/// The sum of some vectors, each times its share.
+fn combination(vectors: &[Vec<f64>], shares: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0; vectors.first().map_or(0, Vec::len)];
+    vectors.iter().zip(shares).for_each(|(vector, share)| subtract(-share, vector, &mut sum));
+    sum
+}
+
+/// `y -= factor x`.
+fn subtract(factor: f64, x: &[f64], y: &mut [f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y -= factor * x);
+}
+
+/// The product of lower blocks and a vector.
+fn multiply(blocks: &Blocks, x: &[f64]) -> Vec<f64> {
+    let mut y = vec![0.0; x.len()];
+    for (&(row, column), block) in blocks {
+        for i in 0..MODES {
+            for j in 0..MODES {
+                let value = block[MODES * i + j];
+                y[MODES * row + i] += value * x[MODES * column + j];
+                if row != column {
+                    y[MODES * column + j] += value * x[MODES * row + i];
                 }
             }
         }
     }
-    blocks
+    y
 }
 
 #[cfg(test)]
-mod tests {
-    use faer::Mat;
-    use faer::prelude::Solve;
-
-    use super::*;
-    use crate::fixture::{Setup, assert_close, column, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis};
-    use crate::scene::Scene;
-
-    /// Every other contact row is kept.
-    fn some(setup: &Setup) -> Vec<bool> {
-        setup.rows().iter().map(|row| row.law().always_holds() || row.terms[0].node % 2 == 0).collect()
-    }
-
-    #[test]
-    fn knows_the_balance_of_the_kept_rows() {
-        for scene in [two_bricks(&[]), two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7)] {
-            on_ranks(&scene, 1, |setup| {
-                let (coarse, kept) = (setup.coarse().expect("the bodies are held"), some(setup));
-                assert!(kept.contains(&false));
-                let mask = Mat::from_fn(kept.len(), kept.len(), |i, j| f64::from(i == j && kept[i]));
-                let g = setup.dense_modes().transpose() * setup.dense_rows().transpose() * &mask;
-                let inverse = |e: Mat<f64>| (&g * g.transpose()).partial_piv_lu().solve(e);
-                let face = CoarseFace::new(&coarse, kept).expect("supports hold both bodies");
-
-                let x = setup.multipliers(1);
-                let amplitudes = inverse(&g * column(&x));
-                assert_close(&column(&face.amplitudes(&coarse, &x)), &amplitudes, 1e-9);
-                let mut projected = x.clone();
-                face.project(&coarse, &mut projected);
-                assert_close(&column(&projected), &(&mask * column(&x) - g.transpose() * &amplitudes), 1e-9);
-                let mut balanced = x.clone();
-                let e = coarse.apply(&setup.multipliers(2));
-                face.add_balance(&coarse, e.clone(), &mut balanced);
-                assert_close(&column(&balanced), &(column(&x) + g.transpose() * inverse(column(&e))), 1e-9);
-            });
-        }
-    }
-
-    /// The upper brick hangs on contact alone, of which nothing is kept.
-    fn hanging() -> Scene {
-        two_bricks(&["support.right.surface=lower.xmax", "support.right.displacement=[0.0, 0.0, 0.0]"])
-    }
-
-    fn equalities(setup: &Setup) -> Vec<bool> {
-        setup.rows().iter().map(|row| row.law().always_holds()).collect()
-    }
-
-    #[test]
-    fn motions_that_the_kept_rows_leave_free_are_left_alone() {
-        for (scene, freedoms) in
-            [(hanging(), 6), (two_bricks(&["support.right.fix=[\"y\", \"z\"]", "support.right.surface=upper.zmax"]), 1)]
-        {
-            on_ranks(&scene, 1, |setup| {
-                let (coarse, kept) = (setup.bare_coarse(), equalities(setup));
-                let mask = Mat::from_fn(kept.len(), kept.len(), |i, j| f64::from(i == j && kept[i]));
-                let g = setup.dense_modes().transpose() * setup.dense_rows().transpose() * &mask;
-                let face = CoarseFace::new(&coarse, kept).expect("only whole bodies are free");
-                assert_eq!(face.free().len(), freedoms);
-                let mut gram = &g * g.transpose();
-                for motion in face.free() {
-                    let n = column(motion);
-                    let resistance = (g.transpose() * &n).norm_l2() / n.norm_l2();
-                    assert!(resistance < 1e-12, "{resistance:e}");
-                    // Of full rank, and the same on all that is balanced.
-                    gram += &n * n.transpose();
-                }
-                let inverse = |e: Mat<f64>| gram.partial_piv_lu().solve(e);
-
-                let x = setup.multipliers(1);
-                let mut projected = x.clone();
-                face.project(&coarse, &mut projected);
-                let expected = &mask * column(&x) - g.transpose() * inverse(&g * column(&x));
-                assert_close(&column(&projected), &expected, 1e-9);
-
-                let mut masked = setup.multipliers(2);
-                face.mask(&mut masked);
-                let balanced = coarse.apply(&masked);
-                let size = column(&balanced).norm_l2();
-                assert_eq!(face.unbalanced(&balanced, size), None);
-                let mut rows = vec![0.0; x.len()];
-                face.add_balance(&coarse, balanced.clone(), &mut rows);
-                assert_close(&column(&coarse.apply(&rows)), &column(&balanced), 1e-9);
-
-                let push: Vec<f64> = balanced.iter().zip(&face.free()[0]).map(|(b, m)| b + 1e-3 * m).collect();
-                let motion = face.unbalanced(&push, size).expect("it is pushed where it is free");
-                assert!((g.transpose() * column(&motion)).norm_l2() < 1e-12 * column(&motion).norm_l2());
-            });
-        }
-    }
-
-    #[test]
-    fn projections_are_the_same_bits_on_any_ranks() {
-        same_on_any_ranks(&two_bricks_by_metis(7), |setup| {
-            let coarse = setup.coarse().expect("the bodies are held");
-            let mut x = setup.multipliers(1);
-            CoarseFace::new(&coarse, some(setup)).expect("supports hold both bodies").project(&coarse, &mut x);
-            setup.owned(&x)
-        });
-        same_on_any_ranks(&hanging(), |setup| {
-            let coarse = setup.bare_coarse();
-            let face = CoarseFace::new(&coarse, equalities(setup)).expect("only whole bodies are free");
-            let mut x = setup.multipliers(1);
-            face.project(&coarse, &mut x);
-            setup.owned(&x)
-        });
-    }
-}
+mod tests;

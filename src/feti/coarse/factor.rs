@@ -11,8 +11,10 @@ use crate::feti::inverse::kernel::MODES;
 use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use crate::sparse::ordering::nested_dissection;
 
-/// A 6x6 block of `G G'`, by `(row, column)` cluster, lower triangle.
-pub type Blocks = BTreeMap<(usize, usize), [f64; MODES * MODES]>;
+/// A 6x6 block of `G G'`, row by row.
+pub type Block = [f64; MODES * MODES];
+/// The blocks of `G G'`, by `(row, column)` cluster, lower triangle.
+pub type Blocks = BTreeMap<(usize, usize), Block>;
 
 /// The clusters that each one has a block with, as METIS wants it: begins and neighbours.
 fn adjacency(blocks: &Blocks, clusters: usize) -> (Vec<i32>, Vec<i32>) {

@@ -1,13 +1,15 @@
 //! The coarse problem `G G' a = r` with `G = R'B'`, and what follows from it.
 //!
-//! [`problem`] sets it up and solves it with a sparse factor ([`factor`]), [`projector`] is `P = I - G'(G G')^-1 G`, [`face`] its
-//! restriction to the rows that hold. [`recover`] has `e = R'f` and `R alpha`, [`motion`] the `alpha` of a solution. [`bodies`] are
+//! [`matrix`] is `G`, [`problem`] what ranks make of it together. [`base`] has the [`factor`] of the equalities, on which [`face`], the
+//! coarse problem of the rows that hold, is built; [`projector`] is `P = I - G'(G G')^-1 G` of all rows. [`recover`] has `e = R'f` and `R alpha`, [`motion`] the `alpha` of a solution. [`bodies`] are
 //! motions of whole bodies, and [`equilibrium`] tells whether anything holds these.
 
+mod base;
 pub mod bodies;
 pub mod equilibrium;
 pub mod face;
 pub mod factor;
+mod matrix;
 pub mod motion;
 pub mod problem;
 pub mod projector;

@@ -1,33 +1,53 @@
-//! `P = I - G'(G G')^-1 G`, the orthogonal projector onto `Ker G`, and the rigid amplitudes that go with it.
+//! `P = I - G'(G G')^-1 G` of all rows, the orthogonal projector onto `Ker G`, and the rigid amplitudes that go with it.
 
-use super::Coarse;
-use super::face::without;
+use super::factor::CoarseFactor;
+use super::{Coarse, Floating};
+use crate::vector::dot;
 
-impl Coarse<'_> {
+/// `P`, with the factor of `G G'`.
+#[derive(Clone, Copy)]
+pub struct Projector<'s, 'a> {
+    coarse: &'s Coarse<'a>,
+    factor: &'s CoarseFactor,
+}
+
+impl<'a> Coarse<'a> {
+    /// `P`. Factorises `G G'` of all rows when it is asked for it first. Collective.
+    ///
+    /// # Errors
+    /// If that is singular: on every rank.
+    pub fn projector(&self) -> Result<Projector<'_, 'a>, Floating> {
+        let factor = match self.whole.get() {
+            Some(factor) => factor,
+            None => {
+                let factor = self.factor_of(&self.blocks(|_| true), || self.unit_blocks(|_| true))?;
+                self.whole.get_or_init(|| factor)
+            }
+        };
+        Ok(Projector { coarse: self, factor })
+    }
+}
+
+impl Projector<'_, '_> {
     /// `rows = P rows`; returns `(G G')^-1 G rows`. One all-gather.
     pub fn project(&self, rows: &mut [f64]) -> Vec<f64> {
-        let mut a = self.apply(rows);
-        self.solve(&mut a);
-        self.add_transpose(-1.0, &a, rows);
+        let mut a = self.coarse.apply(rows);
+        self.factor.solve(&mut a);
+        self.coarse.add_transpose(-1.0, &a, rows);
         a
     }
 
-    /// As [`Coarse::project`]; returns the squared norm of `P rows`, and the sums over all subdomains of `width` numbers
-    /// for each own one, given and returned behind those of the square of `rows`. One all-gather.
-    pub fn project_with_sums(&self, rows: &mut [f64], partial: &[f64], width: usize) -> (f64, Vec<f64>) {
-        let (mut a, mut sums) = self.apply_with_sums(rows, partial, width);
-        let e = a.clone();
-        self.solve(&mut a);
-        self.add_transpose(-1.0, &a, rows);
-        (without(sums.remove(0), &e, &a), sums)
-    }
-
-    /// The smallest `rows` with `G rows = e`: `G'(G G')^-1 e`. Local.
-    pub fn particular(&self, e: &[f64], rows: &mut [f64]) {
-        let mut a = e.to_vec();
-        self.solve(&mut a);
-        rows.fill(0.0);
-        self.add_transpose(1.0, &a, rows);
+    /// As [`Projector::project`] of `x`. Returns `|P x|^2` and `r'P x` for an `r = P r`, and sums over all subdomains of `width`
+    /// numbers for each own one, given and returned behind those of `x'x` and `x'r`. One all-gather.
+    pub fn project_with_sums(&self, x: &mut [f64], partial: &[f64], width: usize) -> ([f64; 2], Vec<f64>) {
+        let ([mut e, contacts, _], sums) = self.coarse.apply_each(self.coarse.base(), (x, &[]), partial, width);
+        e.iter_mut().zip(contacts).for_each(|(e, c)| *e += c);
+        let mut a = e.clone();
+        self.factor.solve(&mut a);
+        self.coarse.add_transpose(-1.0, &a, x);
+        // |P x|^2 = x'x - e'a with e = G x. Not `max`: NaN must stay NaN.
+        let square = sums[0] - dot(&e, &a);
+        ([if square < 0.0 { 0.0 } else { square }, sums[1]], sums[2..].to_vec())
     }
 }
 
@@ -50,14 +70,15 @@ mod tests {
             for ranks in [1, 3] {
                 on_ranks(&scene, ranks, |setup| {
                     let coarse = setup.coarse().expect("the bodies are held");
+                    let p = coarse.projector().expect("all rows hold them");
                     let (x, y) = (setup.multipliers(1), setup.multipliers(2));
                     let [mut px, mut py] = [x.clone(), y.clone()];
-                    let a = coarse.project(&mut px);
-                    coarse.project(&mut py);
+                    let a = p.project(&mut px);
+                    p.project(&mut py);
                     assert!(norm(&coarse.apply(&px)) < 1e-12 * norm(&coarse.apply(&x)));
 
                     let mut twice = px.clone();
-                    coarse.project(&mut twice);
+                    p.project(&mut twice);
                     let error: Vec<f64> = twice.iter().zip(&px).map(|(a, b)| a - b).collect();
                     assert!(norm(&error) < 1e-12 * norm(&px));
 
@@ -71,23 +92,6 @@ mod tests {
                     assert!(norm(&error) < 1e-12 * norm(&x));
                 });
             }
-        }
-    }
-
-    #[test]
-    fn the_particular_multiplier_balances_and_is_the_smallest() {
-        for scene in scenes() {
-            on_ranks(&scene, 2, |setup| {
-                let coarse = setup.coarse().expect("the bodies are held");
-                let e: Vec<f64> = coarse.apply(&setup.multipliers(3));
-                let mut rows = setup.multipliers(4);
-                coarse.particular(&e, &mut rows);
-                let error: Vec<f64> = coarse.apply(&rows).iter().zip(&e).map(|(a, b)| a - b).collect();
-                assert!(norm(&error) < 1e-12 * norm(&e));
-                let size = norm(&rows);
-                coarse.project(&mut rows);
-                assert!(norm(&rows) < 1e-12 * size);
-            });
         }
     }
 }

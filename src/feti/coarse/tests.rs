@@ -1,11 +1,8 @@
 use faer::Mat;
-use faer::prelude::Solve;
 
-use crate::constraint::Kind;
 use crate::feti::inverse::kernel::MODES;
 use crate::fixture::{
-    RANKS, Setup, assert_close, built_in, clustered, column, on_ranks, same_on_any_ranks, two_bricks,
-    two_bricks_by_metis,
+    RANKS, Setup, assert_close, clustered, column, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis,
 };
 use crate::random::Random;
 use crate::scene::Scene;
@@ -32,31 +29,10 @@ fn products_and_solutions_are_those_of_the_dense_matrices() {
             let x = setup.multipliers(1);
             assert_close(&column(&coarse.apply(&x)), &(&g * column(&x)), 1e-13);
 
-            let mut a = amplitudes(g.nrows());
+            let a = amplitudes(g.nrows());
             let mut rows = x.clone();
             coarse.add_transpose(-0.5, &a, &mut rows);
             assert_close(&column(&rows), &(column(&x) - 0.5 * (g.transpose() * column(&a))), 1e-13);
-
-            let expected = (&g * g.transpose()).partial_piv_lu().solve(column(&a));
-            coarse.solve(&mut a);
-            assert_close(&column(&a), &expected, 1e-9);
-        });
-    }
-}
-
-#[test]
-fn a_restricted_coarse_problem_knows_the_kept_rows_only() {
-    for scene in [two_bricks(&["decomposition.cluster=2"]), two_bricks_by_metis(7)] {
-        on_ranks(&scene, 1, |setup| {
-            let (mut g, coarse) = (dense_coarse(setup), setup.coarse().expect("the bodies are held"));
-            let kept: Vec<bool> = setup.rows().iter().map(|row| row.law().always_holds()).collect();
-            for row in (0..kept.len()).filter(|&row| !kept[row]) {
-                g.col_mut(row).fill(0.0);
-            }
-            let mut a = amplitudes(g.nrows());
-            let expected = (&g * g.transpose()).partial_piv_lu().solve(column(&a));
-            coarse.restricted(|row| kept[row]).expect("supports hold both bodies").solve(&mut a);
-            assert_close(&column(&a), &expected, 1e-9);
         });
     }
 }
@@ -64,21 +40,16 @@ fn a_restricted_coarse_problem_knows_the_kept_rows_only() {
 #[test]
 fn coarse_products_and_solutions_are_the_same_bits_on_any_ranks() {
     for scene in [clustered(), two_bricks_by_metis(7)] {
-        for solved in [false, true] {
-            same_on_any_ranks(&scene, |setup| {
-                let coarse = setup.coarse().expect("the bodies are held");
-                let mut a = coarse.apply(&setup.multipliers(2));
-                if solved {
-                    coarse.solve(&mut a);
-                }
-                let shares = &setup.discrete.decomposition.clusters.shares;
-                a[MODES * shares.begin(setup.comm.rank())..][..MODES * shares.0[setup.comm.rank()]].to_vec()
-            });
-        }
+        same_on_any_ranks(&scene, |setup| {
+            let coarse = setup.coarse().expect("the bodies are held");
+            let a = coarse.apply(&setup.multipliers(2));
+            let shares = &setup.discrete.decomposition.clusters.shares;
+            a[MODES * shares.begin(setup.comm.rank())..][..MODES * shares.0[setup.comm.rank()]].to_vec()
+        });
         same_on_any_ranks(&scene, |setup| {
             let coarse = setup.coarse().expect("the bodies are held");
             let mut rows = setup.multipliers(2);
-            coarse.project(&mut rows);
+            coarse.projector().expect("all rows hold them").project(&mut rows);
             setup.owned(&rows)
         });
     }
@@ -102,16 +73,4 @@ fn what_nothing_holds_floats_on_every_rank() {
             assert!(found.iter().all(|f| f.0.as_ref() == Some(floating)), "{ranks} ranks: {found:?}");
         }
     }
-}
-
-#[test]
-fn a_body_that_only_contact_holds_floats_without_it() {
-    // Pushed along x by nothing, the upper brick of the patch test rests on the contact along z.
-    let resting = built_in("patch", &["support.top.surface=lower.zmin", "support.top.displacement=[0.0, 0.0, 0.0]"]);
-    on_ranks(&resting, 1, |setup| {
-        let coarse = setup.coarse().expect("contact holds the upper brick");
-        let gluing_and_supports = |row: usize| !matches!(setup.rows()[row].kind, Kind::Contact { .. });
-        let floating = coarse.restricted(gluing_and_supports).err().expect("nothing holds it along z");
-        assert_eq!(setup.subdomains()[floating.subdomain].body, 1);
-    });
 }

@@ -1,0 +1,202 @@
+//! `G = R'B'`: six lines a cluster, one column for each row of `B`.
+//!
+//! Kept by columns, for `G'a`, and by clusters, for `G x`. Equalities and inequalities are kept apart: what equalities make of
+//! the coarse problem never changes.
+
+use std::ops::Range;
+
+use super::factor::{Block, Blocks};
+use crate::constraint::{Constraints, Kind, Row};
+use crate::decomposition::{Clusters, Subdomain};
+use crate::feti::dual::gather::Gather;
+use crate::feti::inverse::kernel::{MODES, RigidModes};
+
+/// Which rows of `B`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rows {
+    /// Those that always hold.
+    Equalities,
+    /// Contacts, which may open.
+    Inequalities,
+}
+
+impl Rows {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Equalities, Self::Inequalities];
+
+    fn of(row: &Row) -> Self {
+        if row.law().always_holds() { Self::Equalities } else { Self::Inequalities }
+    }
+}
+
+/// `G` of one rank: all columns of its rows, and all lines of its own clusters.
+pub(super) struct Matrix {
+    /// First slot of each row, and the end.
+    begin: Vec<u32>,
+    /// For each slot of each row the cluster, and the values of its six modes. Gluing within a cluster has no slot.
+    cluster: Vec<u32>,
+    modes: Vec<[f64; MODES]>,
+    /// Rows with slots: equalities, and inequalities.
+    moving: [Vec<u32>; 2],
+    /// Number of the first own cluster.
+    first: usize,
+    /// What acts on each own cluster, in row order: equalities, and inequalities.
+    acting: [Vec<Vec<Acting>>; 2],
+}
+
+/// A row that acts on a cluster, with a copy of its slot's modes: what is summed lies side by side.
+struct Acting {
+    row: u32,
+    modes: [f64; MODES],
+}
+
+impl Matrix {
+    /// Of the rows of this rank. One neighbour exchange.
+    pub fn new(
+        (clusters, rank): (&Clusters, usize),
+        subdomains: &[Subdomain],
+        modes: &[RigidModes],
+        constraints: &Constraints,
+        gather: &Gather,
+    ) -> Self {
+        let mut result = Self {
+            begin: vec![0],
+            cluster: Vec::new(),
+            modes: Vec::new(),
+            moving: Default::default(),
+            first: clusters.shares.begin(rank),
+            acting: Default::default(),
+        };
+        gather.exchange(
+            MODES,
+            |own, slots| {
+                for entry in gather.entries(own) {
+                    let (node, axis) = (entry.dof as usize / 3, entry.dof as usize % 3);
+                    let row = modes[own].at(subdomains[own].points[node])[axis];
+                    let at = MODES * entry.slot as usize;
+                    slots[at..at + MODES].iter_mut().zip(row).for_each(|(s, r)| *s += entry.value * r);
+                }
+            },
+            |row, values| {
+                let cluster = |slot: usize| clusters.of(constraints.slot_subdomain[slot] as usize) as u32;
+                let slots = constraints.slots(row).map(cluster).zip(values.as_chunks::<MODES>().0);
+                result.push(row, &constraints.rows[row], slots);
+            },
+        );
+        result.act(clusters.shares.0[rank]);
+        result
+    }
+
+    /// Adds the next row, with the clusters and modes' values of its slots.
+    fn push<'s>(&mut self, row: usize, of: &Row, slots: impl Iterator<Item = (u32, &'s [f64; MODES])>) {
+        let begin = self.cluster.len();
+        for (cluster, six) in slots {
+            // Copies of one node, unless it is contact.
+            let is_copy = of.law().always_holds() && self.cluster[begin..].last() == Some(&cluster);
+            if let Some(sum) = self.modes.last_mut().filter(|_| is_copy) {
+                sum.iter_mut().zip(six).for_each(|(s, x)| *s += x);
+            } else {
+                self.cluster.push(cluster);
+                self.modes.push(*six);
+            }
+        }
+        if of.kind == Kind::Gluing && self.cluster.len() == begin + 1 {
+            self.cluster.truncate(begin);
+            self.modes.truncate(begin);
+        }
+        if self.cluster.len() > begin {
+            self.moving[Rows::of(of) as usize].push(row as u32);
+        }
+        self.begin.push(self.cluster.len() as u32);
+    }
+
+    /// Finds what acts on each of `count` own clusters.
+    fn act(&mut self, count: usize) {
+        for rows in Rows::ALL {
+            let mut acting: Vec<Vec<Acting>> = (0..count).map(|_| Vec::new()).collect();
+            for &row in &self.moving[rows as usize] {
+                for slot in self.slots(row as usize) {
+                    let own = (self.cluster[slot] as usize).checked_sub(self.first);
+                    if let Some(acting) = own.and_then(|own| acting.get_mut(own)) {
+                        acting.push(Acting { row, modes: self.modes[slot] });
+                    }
+                }
+            }
+            self.acting[rows as usize] = acting;
+        }
+    }
+
+    /// Number of rows of `B` on this rank.
+    pub fn rows(&self) -> usize {
+        self.begin.len() - 1
+    }
+
+    /// Slots of a row of `B`.
+    fn slots(&self, row: usize) -> Range<usize> {
+        self.begin[row] as usize..self.begin[row + 1] as usize
+    }
+
+    /// The clusters that a row acts on, with its forces on their modes.
+    pub fn forces(&self, row: usize) -> impl Iterator<Item = (usize, &[f64; MODES])> {
+        self.slots(row).map(|slot| (self.cluster[slot] as usize, &self.modes[slot]))
+    }
+
+    /// `G x` on the own clusters by some rows of `x`, summed in the order of the rows.
+    pub fn resultants(&self, rows: Rows, x: impl Fn(usize) -> f64) -> impl Iterator<Item = [f64; MODES]> {
+        self.acting[rows as usize].iter().map(move |acting| {
+            let mut sum = [0.0; MODES];
+            for Acting { row, modes } in acting {
+                let x = x(*row as usize);
+                sum.iter_mut().zip(modes).for_each(|(s, g)| *s += g * x);
+            }
+            sum
+        })
+    }
+
+    /// `x += factor G'a` in some rows, in those of them that are `wanted`.
+    pub fn add_transpose(&self, rows: Rows, wanted: impl Fn(usize) -> bool, factor: f64, a: &[f64], x: &mut [f64]) {
+        let a = a.as_chunks::<MODES>().0;
+        for &row in self.moving[rows as usize].iter().filter(|row| wanted(**row as usize)) {
+            let of_slot = |slot: usize| dot(&self.modes[slot], &a[self.cluster[slot] as usize]);
+            x[row as usize] += factor * self.slots(row as usize).map(of_slot).sum::<f64>();
+        }
+    }
+
+    /// Blocks of `G W G'` of some rows with the diagonal `W`: the lower ones on own clusters. Complete: every row that a subdomain
+    /// takes part in is on its rank.
+    pub fn products(&self, rows: Rows, weight: impl Fn(usize) -> f64) -> Blocks {
+        let mut result = Blocks::new();
+        for (cluster, acting) in (self.first..).zip(&self.acting[rows as usize]) {
+            // A cluster has few neighbours.
+            let (mut columns, mut blocks): (Vec<u32>, Vec<Block>) = Default::default();
+            for Acting { row, modes } in acting {
+                let weight = weight(*row as usize);
+                if weight == 0.0 {
+                    continue;
+                }
+                let modes = modes.map(|g| weight * g);
+                for other in self.slots(*row as usize) {
+                    let column = self.cluster[other];
+                    if column as usize > cluster {
+                        continue;
+                    }
+                    let at = columns.iter().position(|c| *c == column).unwrap_or_else(|| {
+                        blocks.push([0.0; MODES * MODES]);
+                        columns.push(column);
+                        columns.len() - 1
+                    });
+                    for (a, products) in modes.iter().zip(blocks[at].as_chunks_mut::<MODES>().0) {
+                        products.iter_mut().zip(&self.modes[other]).for_each(|(p, b)| *p += a * b);
+                    }
+                }
+            }
+            result.extend(columns.into_iter().map(|column| (cluster, column as usize)).zip(blocks));
+        }
+        result
+    }
+}
+
+/// The sum of products, as three chains of additions.
+fn dot(g: &[f64; MODES], a: &[f64; MODES]) -> f64 {
+    (g[0] * a[0] + g[3] * a[3]) + (g[1] * a[1] + g[4] * a[4]) + (g[2] * a[2] + g[5] * a[5])
+}
