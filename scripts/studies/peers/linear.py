@@ -57,8 +57,9 @@ class Blocks:
 
 
 class Linear:
-    """Solves one system after the other. Aggregates of GAMG are kept while the constrained unknowns stay the same; with a
-    `lag` above 0 the whole hierarchy is, as long as it takes at most so many times the iterations it took when it was new."""
+    """Solves one system after the other. Aggregates of GAMG fit one set of constrained unknowns and are kept with it. With a
+    `lag` above 0 the whole hierarchy is kept, for other sets as well, until it takes more than so many times the iterations it
+    took when it was new."""
 
     def __init__(self, blocks, solver, lag=0.0, more=None):
         self.blocks, self.solver, self.lag = blocks, solver, lag
@@ -72,27 +73,34 @@ class Linear:
     def solve(self, values, right, tolerance, constrained, modes):
         """`modes`: rigid motions of the nodes, zero where they are constrained."""
         self.assemble(values)
-        same = self.constrained is not None and total(int((self.constrained != constrained).sum())) == 0
         if self.solver == "gamg":
             self.matrix.setNearNullSpace(self.orthonormal(modes))
-            if not same:
-                self.close()
-        self.constrained = constrained
-        while True:
-            renewed = self.set_up(tolerance)
-            right_side = self.blocks.vector(right)
-            solution = right_side.duplicate()
-            with self.clock("solve"):
-                self.ksp.solve(right_side, solution)
-            self.last = self.ksp.getIterationNumber()
-            if self.ksp.getConvergedReason() > 0:
-                break
-            if renewed:
-                raise RuntimeError(f"the linear solver failed: {self.ksp.getConvergedReason()}")
+        solution, reason, renewed = self.attempt(right, tolerance, constrained)
+        if reason <= 0 and not renewed:
             self.close()
+            solution, reason, renewed = self.attempt(right, tolerance, constrained)
+        if reason <= 0:
+            raise RuntimeError(f"the linear solver failed: {reason}")
         if renewed:
             self.fresh = self.last
         return solution.array.reshape(-1, 3).copy(), self.last
+
+    def attempt(self, right, tolerance, constrained):
+        """Solution, PETSc's reason to stop, and whether the preconditioner was made for it."""
+        renewed = self.ksp is None or self.lag == 0 or self.last > self.lag * self.fresh + 2
+        if renewed:
+            other = self.constrained is not None and total(int((self.constrained != constrained).sum())) > 0
+            if other and self.solver == "gamg":
+                self.close()
+            self.constrained = constrained
+        with self.clock("set-up"):
+            self.set_up(tolerance, renewed)
+        right_side = self.blocks.vector(right)
+        solution = right_side.duplicate()
+        with self.clock("solve"):
+            self.ksp.solve(right_side, solution)
+        self.last = self.ksp.getIterationNumber()
+        return solution, self.ksp.getConvergedReason(), renewed
 
     def assemble(self, values):
         csr = self.blocks.csr(values)
@@ -104,20 +112,16 @@ class Linear:
             self.matrix.setValuesCSR(csr.indptr, csr.indices, csr.data)
             self.matrix.assemble()
 
-    def set_up(self, tolerance):
-        """Whether the preconditioner is made of the present matrix."""
-        renewed = self.ksp is None or self.lag == 0 or self.last > self.lag * self.fresh + 2
-        with self.clock("set-up"):
-            if self.ksp is None:
-                self.ksp = PETSc.KSP().create(COMM)
-                self.ksp.setOptionsPrefix(f"{self.solver}_")
-                self.ksp.setFromOptions()
-            if renewed and self.lag > 0:
-                self.keep()
-            self.ksp.setOperators(self.matrix, self.kept or self.matrix)
-            self.ksp.setTolerances(rtol=tolerance)
-            self.ksp.setUp()
-        return renewed
+    def set_up(self, tolerance, renewed):
+        if self.ksp is None:
+            self.ksp = PETSc.KSP().create(COMM)
+            self.ksp.setOptionsPrefix(f"{self.solver}_")
+            self.ksp.setFromOptions()
+        if renewed and self.lag > 0:
+            self.keep()
+        self.ksp.setOperators(self.matrix, self.kept or self.matrix)
+        self.ksp.setTolerances(rtol=tolerance)
+        self.ksp.setUp()
 
     def keep(self):
         """A copy of the matrix for the preconditioner, which does not change with it."""

@@ -28,7 +28,8 @@ from plasticity import COMM, Material, dot, total  # noqa: E402
 from scipy.sparse.csgraph import reverse_cuthill_mckee  # noqa: E402
 
 TUNED = {"pc_gamg_use_sa_esteig": False}
-"""Beside the options of the blocks; with a kept hierarchy the fastest of those tried."""
+"""Beside the options of the blocks. With a kept hierarchy, and contact that starts with the nodes that touch, the fastest of
+those tried."""
 LAG = 2.0
 CHUNK = 50000
 """Elements whose matrices are in memory at a time."""
@@ -244,7 +245,7 @@ def main():
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     equations = Equations(part.load(arguments.scene, arguments.mesh))
-    u, active = np.zeros((equations.d.own, 3)), np.zeros(len(equations.contact), bool)
+    u, active = np.zeros((equations.d.own, 3)), equations.height <= 0
     state, active, rows, converged = newton(equations, u, active)
     force = total(float((state.force - equations.load)[equations.contact, equations.axis].sum()))
     told = {**summary(equations, state, rows, converged), "contact_force": abs(force), "newton": rows}
