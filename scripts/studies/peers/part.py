@@ -43,11 +43,12 @@ class Pair(typing.NamedTuple):
     clearance: float | None
 
 
-def load(scene_file, mesh_file):
+def load(scene_file):
     scene = tomllib.loads(scene_file.read_text())
     known = {"title", "units", "material", "body", "support", "load", "contact"}
     if unknown := scene.keys() - known:
         raise ValueError(f"{scene_file}: peers do not know {', '.join(sorted(unknown))}")
+    (mesh_file,) = {scene_file.parent / body["gmsh"]["file"] for body in scene["body"].values()}
     mesh = read(mesh_file)
     bodies, materials = {}, {}
     for name, body in scene["body"].items():

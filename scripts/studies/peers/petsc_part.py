@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A part with a mesh of Gmsh solved with PETSc: what a user would write with petsc4py instead of installing fetiplast.
 
-    mpirun -np 2 /usr/bin/python3 scripts/studies/peers/petsc_part.py SCENE --mesh FILE --out DIR
+    mpirun -np 2 /usr/bin/python3 scripts/studies/peers/petsc_part.py SCENE --out DIR
 
 The same discrete problem as fetiplast's, from the same two files: one body, supports, loads, and nodes that must not enter a
 rigid plane. Newton's method and the linear systems are those of petsc.py; nodes that the plane holds are constrained. The nodes
@@ -240,15 +240,16 @@ class State:
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene", type=pathlib.Path)
-    parser.add_argument("--mesh", type=pathlib.Path, required=True)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    equations = Equations(part.load(arguments.scene, arguments.mesh))
+    given = part.load(arguments.scene)
+    equations = Equations(given)
     u, active = np.zeros((equations.d.own, 3)), equations.height <= 0
     state, active, rows, converged = newton(equations, u, active)
-    force = total(float((state.force - equations.load)[equations.contact, equations.axis].sum()))
-    told = {**summary(equations, state, rows, converged), "contact_force": abs(force), "newton": rows}
+    force = [0.0, 0.0, 0.0]
+    force[equations.axis] = total(float((state.force - equations.load)[equations.contact, equations.axis].sum()))
+    told = {**summary(equations, state, rows, converged), "contact_forces": {c.name: force for c in given.contacts}, "newton": rows}
     told |= circumstances(STARTED, equations.linear.seconds)
     if COMM.rank == 0:
         (arguments.out / "summary.json").write_text(json.dumps(told) + "\n")
