@@ -17,7 +17,6 @@ import ccx
 import numpy as np
 import part
 
-INCREMENT = 0.2
 PENALTY = 1e5
 """Pressure per overclosure, MPa/mm."""
 SIDES = np.array([1, 2, 4, 3])
@@ -42,8 +41,8 @@ def write(file, given, options):
     print("*BOUNDARY", file=file)
     ccx.lines(file, ([n + 1, c + 1, c + 1] for n, c in np.argwhere(given.fixed).tolist()))
     for contact in given.contacts:
-        write_contact(file, given, elements, contact, options)
-    print(f"*STEP,INC=200\n*STATIC,SOLVER={options.solver}\n{options.increment},1.,1e-5,{options.largest}\n*CLOAD", file=file)
+        write_contact(file, given, elements, contact)
+    print(f"*STEP,INC=200\n*STATIC,SOLVER={options.solver}\n{options.increment},1.,1e-5,{options.increment}\n*CLOAD", file=file)
     loaded = np.argwhere(given.forces)
     values = given.forces[tuple(loaded.T)].tolist()
     file.writelines(f"{n + 1},{c + 1},{value:.12g}\n" for (n, c), value in zip(loaded.tolist(), values))
@@ -53,7 +52,7 @@ def write(file, given, options):
     print("*END STEP", file=file)
 
 
-def write_contact(file, given, elements, contact, options):
+def write_contact(file, given, elements, contact):
     slave, master = f"S-{contact.name}".upper(), f"M-{contact.name}".upper()
     write_surface(file, slave, contact.slave, elements)
     if isinstance(contact, part.Floor):
@@ -61,8 +60,8 @@ def write_contact(file, given, elements, contact, options):
     else:
         write_surface(file, master, contact.master, elements)
     print(
-        f"*SURFACE INTERACTION,NAME=I{slave}\n*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR\n{options.penalty:g},1.\n"
-        f"*CONTACT PAIR,INTERACTION=I{slave},TYPE={options.contact}\n{slave},{master}",
+        f"*SURFACE INTERACTION,NAME=I{slave}\n*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR\n{PENALTY:g},1.\n"
+        f"*CONTACT PAIR,INTERACTION=I{slave},TYPE=SURFACE TO SURFACE\n{slave},{master}",
         file=file,
     )
     if getattr(contact, "clearance", None) is not None:
@@ -104,11 +103,8 @@ def found(blocks, contacts):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene", type=pathlib.Path)
-    parser.add_argument("--solver", default="ITERATIVE CHOLESKY")
-    parser.add_argument("--penalty", type=float, default=PENALTY)
-    parser.add_argument("--contact", default="SURFACE TO SURFACE")
-    parser.add_argument("--increment", default="0.2")
-    parser.add_argument("--largest", default="0.2")
+    parser.add_argument("--solver", choices=["ITERATIVE CHOLESKY", "SPOOLES"], default="ITERATIVE CHOLESKY")
+    parser.add_argument("--increment", type=float, default=1.0, help="share of the load that is tried at once")
     ccx.add_arguments(parser)
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import scipy.sparse
 from petsc4py import PETSc
-from plasticity import COMM, MPI, total
+from ranks import COMM, MPI, total
 
 OPTIONS = {
     "gamg": {

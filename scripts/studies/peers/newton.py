@@ -4,7 +4,7 @@ after Eisenstat and Walker, and fetiplast's tolerances at the end."""
 import typing
 
 import numpy as np
-from plasticity import MPI, dot, total
+from ranks import MPI, dot, total
 
 NEWTON_TOLERANCE, RESIDUAL_TOLERANCE, NEWTON_LIMIT = 1e-4, 1e-6, 40
 LOOSEST = 1e-2

@@ -24,7 +24,8 @@ import part  # noqa: E402
 import scipy.sparse  # noqa: E402
 from linear import Blocks, Linear, circumstances, rigid_modes  # noqa: E402
 from newton import Step, newton, summary  # noqa: E402
-from plasticity import COMM, Material, dot, total  # noqa: E402
+from plasticity import Material  # noqa: E402
+from ranks import COMM, dot, total  # noqa: E402
 from scipy.sparse.csgraph import reverse_cuthill_mckee  # noqa: E402
 
 TUNED = {"pc_gamg_use_sa_esteig": False}

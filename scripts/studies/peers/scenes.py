@@ -25,13 +25,15 @@ class Scene(typing.NamedTuple):
     scales: dict
     """Of the widths of elements, by thousands of nodes."""
     peers: list
+    increment: float = 1.0
+    """Share of the load that CalculiX takes at once: the largest that it manages."""
 
 
 HOUSING = {30: 0.97, 90: 0.64, 260: 0.437}
 SCENES = {
     "housing": Scene("housing", HOUSING, ["petsc-gamg"]),
     "housing-floor": Scene("housing", HOUSING, ["petsc-gamg", "calculix"]),
-    "flange": Scene("flange", {20: 1.2, 60: 0.74, 150: 0.52}, ["calculix"]),
+    "flange": Scene("flange", {20: 1.2, 60: 0.74, 150: 0.52}, ["calculix"], 0.2),
 }
 FINEST = {"calculix": 30}
 """The last mesh a peer is run on, in thousands of nodes: the next would take hours."""
@@ -103,7 +105,8 @@ def command(program, file, ours):
     if program == "petsc-gamg":
         return [str(file)], RANKS, [*ours.on(RANKS, PYTHON), str(FOLDER / "petsc_part.py")]
     if program == "calculix":
-        return [str(file), "--threads", str(RANKS)], RANKS, [PYTHON, str(FOLDER / "calculix_part.py")]
+        options = [str(file), "--threads", str(RANKS), "--increment", str(SCENES[file.stem].increment)]
+        return options, RANKS, [PYTHON, str(FOLDER / "calculix_part.py")]
     tight = [word for key in TIGHT for word in ("--set", key)]
     return [str(file), *(tight if program == EXACT else [])], RANKS
 
@@ -116,11 +119,12 @@ def linear_seconds(record):
     return sum(summary["linear_seconds"].values()) if "linear_seconds" in summary else None
 
 
-def inner(summary):
-    """Applications of F, iterations of CG; CalculiX does not tell its own."""
-    newton = summary.get("newton_iterations")
-    count = summary.get("hessian_multiplications", summary["iterations"] if newton else None)
-    return newton, count
+def counts(summary):
+    """Newton steps; applications of F or iterations of CG, and those a Newton step. CalculiX tells all of its iterations."""
+    if "newton_iterations" not in summary:
+        return [summary["iterations"], "", ""]
+    count = summary["hessian_multiplications" if "hessian_multiplications" in summary else "iterations"]
+    return [summary["newton_iterations"], count, f"{count / summary['newton_iterations']:.1f}"]
 
 
 def contact_error(summary, reference):
@@ -135,25 +139,31 @@ def norms(forces):
     return {name: sum(x * x for x in force) ** 0.5 for name, force in forces.items()}
 
 
-def times(records, ours, value):
-    """Median over fetiplast's."""
-    return middle(records, value) / middle(ours, value)
+def timed(records, ours):
+    """Not where other work ran beside."""
+    return all(record["provenance"]["quiet"] for record in [*records, *ours])
+
+
+def beside(records, ours, value):
+    """The median over fetiplast's."""
+    known = value(records[0]) is not None and (value is memory_of or timed(records, ours))
+    return f"{middle(records, value) / middle(ours, value):.2f}" if known else ""
+
+
+def measured(records, ours, value):
+    """A value of all repetitions, and their median over fetiplast's."""
+    ratio = beside(records, ours, value)
+    return [spread(map(value, records)) if ratio else "", ratio]
 
 
 def row(program, records, ours, reference):
     if ended(records):
         return no_result(program, records, ours, len(COLUMNS))
     summary = records[0]["summary"]
-    newton, count = inner(summary)
-    told = linear_seconds(records[0]) is not None
     displacement = abs(summary["max_displacement"] / reference["max_displacement"] - 1) if reference else None
-    return [
-        program, spread(map(seconds_of, records)), f"{times(records, ours, seconds_of):.2f}",
-        spread(map(linear_seconds, records)) if told else "", f"{times(records, ours, linear_seconds):.2f}" if told else "",
-        spread(map(memory_of, records)), f"{times(records, ours, memory_of):.2f}",
-        "" if displacement is None else f"{displacement:.1e}", contact_error(summary, reference or {}),
-        summary["plastic_elements"], newton or summary["iterations"], count or "", f"{count / newton:.1f}" if count else "",
-    ]
+    cells = [cell for value in (seconds_of, linear_seconds, memory_of) for cell in measured(records, ours, value)]
+    cells += ["" if displacement is None else f"{displacement:.1e}", contact_error(summary, reference or {})]
+    return [program, *cells, summary["plastic_elements"], *counts(summary)]
 
 
 COLUMNS = ["", "seconds", "times", "linear seconds", "times", "MiB", "times", "error of largest displacement"]
@@ -191,17 +201,16 @@ def short(found):
     """For the README."""
     rows = []
     for name, nodes in cases(found):
-        ours, _ = found[(name, nodes), OURS]
-        newton, count = inner(ours[0]["summary"])
-        start = [name, thousands(ours[0]["summary"]["nodes"]), spread(map(seconds_of, ours)), f"{count / newton:.1f}"]
+        summary = found[(name, nodes), OURS][0][0]["summary"]
+        start = [name, thousands(summary["nodes"]), counts(summary)[-1]]
         for peer in SCENES[name].peers:
             if ((name, nodes), peer) not in found:
                 continue
-            records, beside = found[(name, nodes), peer]
+            records, ours = found[(name, nodes), peer]
             if ended(records):
-                rows.append([*start, *no_result(peer, records, beside, 6)[:1], no_result(peer, records, beside, 6)[2], "", ""])
-                continue
-            linear = f"{times(records, beside, linear_seconds):.2f}" if linear_seconds(records[0]) is not None else ""
-            rows.append([*start, peer, f"{times(records, beside, seconds_of):.2f}", linear, f"{times(records, beside, memory_of):.2f}"])
-    head = ["", "nodes", "seconds", "F a Newton step", "beside", "times time", "times linear", "times memory"]
+                cells = [no_result(peer, records, ours, 3)[2], "", ""]
+            else:
+                cells = [beside(records, ours, value) for value in (seconds_of, linear_seconds, memory_of)]
+            rows.append([*start, measured(ours, ours, seconds_of)[0], peer, *cells])
+    head = ["", "nodes", "F a Newton step", "seconds", "beside", "times seconds", "times linear seconds", "times memory"]
     return SHORT + table(head, rows) if rows else ""
