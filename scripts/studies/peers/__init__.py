@@ -21,7 +21,7 @@ PACKAGES = ["python3-petsc4py-real", "python3-mpi4py", "python3-scipy", "python3
 PACKAGES += ["libopenblas0-pthread"]
 """The last one because PETSc's direct solvers are ten times slower with the reference BLAS."""
 
-READ = ("contact_force", "contact_forces", "time", "linear_seconds")
+READ = ("contact_force", "contact_forces", "time", "communication", "linear_seconds")
 """Of the lists in a summary."""
 
 NAMES = sorted({*blocks.PEERS, *(peer for scene in scenes.SCENES.values() for peer in scene.peers)})

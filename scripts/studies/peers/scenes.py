@@ -40,6 +40,8 @@ FINEST = {"calculix": 30}
 
 BESIDE = {"assembly", "internal forces", "discretisation", "residuals", "output", "certificate", "error estimate"}
 """Phases of fetiplast that are no part of its linear systems; all others are."""
+MESSAGES = ("collectives", "neighbour exchange")
+"""Which belong to them as well: PETSc's seconds have those of its own."""
 
 HEAD = """\
 ## Users' meshes
@@ -61,9 +63,9 @@ The programs:
   fastest on the smallest meshes, {solver}; the floor is a fixed brick. Contact integrals, penalty and increments differ
   from fetiplast's, and so do results.
 
-*Linear seconds* are what linear systems take. Of fetiplast: F, preconditioner, factors, coarse problem, and all that is no
-assembly, residual, input or output. Of PETSc: set-up and solve of KSP, without Python. "Times" divides by fetiplast's in the
-same run. Errors are relative to fetiplast in double precision with tolerances of 1e-8 (Newton), 1e-9 (residual), 1e-10 (QP).
+*Linear seconds* are what linear systems take, messages included. Of fetiplast: F, preconditioner, factors, coarse problem, and
+all that is no assembly, residual, input or output; each on its slowest rank. Of PETSc: set-up and solve of KSP, without Python.
+"Times" divides by fetiplast's in the same run. Errors are relative to fetiplast in double precision with tolerances of 1e-8 (Newton), 1e-9 (residual), 1e-10 (QP).
 *A step* is applications of F, or iterations of CG, a Newton step.
 """
 
@@ -115,7 +117,8 @@ def linear_seconds(record):
     """Of linear systems alone; None where they are not told."""
     summary = record["summary"]
     if "time" in summary:
-        return sum(seconds for phase, seconds in summary["time"].items() if phase not in BESIDE)
+        messages = sum(summary["communication"][kind]["seconds"] for kind in MESSAGES)
+        return messages + sum(seconds for phase, seconds in summary["time"].items() if phase not in BESIDE)
     return sum(summary["linear_seconds"].values()) if "linear_seconds" in summary else None
 
 
