@@ -4,9 +4,10 @@ that no two meshes match.
 
     scripts/meshes/flange.py [--scale S] [--out FILE]
 
-S multiplies the width of all elements: 1.2, 0.74 and 0.52 give about 20, 60 and 150 thousand nodes. Volumes `lower`, `upper`, `bolts` (all of them, heads at both ends); surfaces `end` of
-each pipe, `bore` and `side` inside and outside of it, `seat` where the flanges meet, `back` where the heads press on them;
-of the bolts `nut` and `head`, which press, and `top`, the end of the head.
+S multiplies the width of all elements: 1.2, 0.74 and 0.52 give about 20, 60 and 150 thousand nodes. Volumes `lower`, `upper`,
+`bolts` (all of them, with a head at both ends); surfaces `end` of each pipe, `bore` and `side` inside and outside of it, `seat`
+where the flanges meet, `back` where the heads press on them; of the bolts `nut` and `head`, which press, and `top`, the end of
+the head.
 """
 
 import argparse

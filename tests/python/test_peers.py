@@ -69,8 +69,12 @@ def test_a_scene_is_read_with_its_mesh(cube):
 
 @pytest.mark.parametrize(
     "key, other",
-    [('"tet4"', '"hex8"'), ("normal = [0.0, 0.0, 1.0]", "normal = [0.0, 0.6, 0.8]"), ('fix = ["x", "z"]', 'fix = ["x"]\ndisplacement = [1.0, 0.0, 0.0]'),
-     ("[material", "[solver]\n[material")],
+    [
+        ('"tet4"', '"hex8"'),
+        ("normal = [0.0, 0.0, 1.0]", "normal = [0.0, 0.6, 0.8]"),
+        ('fix = ["x", "z"]', 'fix = ["x"]\ndisplacement = [1.0, 0.0, 0.0]'),
+        ("[material", "[solver]\n[material"),
+    ],
     ids=["element", "slanted plane", "displacement", "solver"],
 )
 def test_what_peers_do_not_know_is_refused(cube, key, other):

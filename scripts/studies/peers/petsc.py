@@ -25,7 +25,7 @@ import numpy as np  # noqa: E402
 from linear import OPTIONS, Blocks, Linear, circumstances, rigid_modes  # noqa: E402
 from newton import Step, newton, summary  # noqa: E402
 from plasticity import Material  # noqa: E402
-from ranks import COMM, MPI, dot, total  # noqa: E402
+from ranks import COMM, MPI, total  # noqa: E402
 
 STEEL = Material(young=210000.0, poisson=0.29, yield_stress=450.0, hardening=10000.0)
 PRESSURE = 150.0

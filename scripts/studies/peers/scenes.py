@@ -1,4 +1,4 @@
-"""Scenes with meshes of Gmsh as users bring them: fetiplast beside PETSc where there is one body, CalculiX where there is contact."""
+"""Scenes with meshes as users bring them: fetiplast beside PETSc where there is one body, CalculiX where there is contact."""
 
 import contextlib
 import pathlib
@@ -59,14 +59,14 @@ The programs:
   hierarchy is kept as long as it takes at most twice the iterations it took when it was new, also while contacts change;
   smoothers estimate eigenvalues of their own; contact starts with the nodes that touch. These are the fastest settings of
   those tried. Not run on the flange: its contact is not node to node.
-- **calculix** ([calculix_part.py](../scripts/studies/peers/calculix_part.py)): as for the benchmark, with the solver that was
-  fastest on the smallest meshes, {solver}; the floor is a fixed brick. Contact integrals, penalty and increments differ
-  from fetiplast's, and so do results.
+- **calculix** ([calculix_part.py](../scripts/studies/peers/calculix_part.py)): as for the benchmark, with as much of the load in
+  an increment as it manages: all on the floor, a fifth with the flange. The floor is a fixed brick. Contact integrals, penalty
+  and increments differ from fetiplast's, and so do results.
 
 *Linear seconds* are what linear systems take, messages included. Of fetiplast: F, preconditioner, factors, coarse problem, and
 all that is no assembly, residual, input or output; each on its slowest rank. Of PETSc: set-up and solve of KSP, without Python.
-"Times" divides by fetiplast's in the same run. Errors are relative to fetiplast in double precision with tolerances of 1e-8 (Newton), 1e-9 (residual), 1e-10 (QP).
-*A step* is applications of F, or iterations of CG, a Newton step.
+"Times" divides by fetiplast's in the same run. *A step* is applications of F, or iterations of CG, a Newton step. Errors are
+relative to fetiplast in double precision with tolerances of 1e-8 (Newton), 1e-9 (residual), 1e-10 (QP).
 """
 
 
