@@ -158,6 +158,11 @@ def test_what_was_ended_for_its_time_is_told(records):
     assert "| petsc-gamg | no result after 50 | > 25 |" in page and "| petsc-gamg | > 25 |  |  |" in short
 
 
+def test_fetiplast_alone_is_told_too(records):
+    page, short = told(records, [OURS])
+    assert "| fetiplast | 2 | 1.00 | 0.75 |" in page and "| housing-floor | 29 955 | 20.0 | 2 |  |  |  |  |" in short
+
+
 def test_times_are_not_told_of_a_busy_machine(records):
     busy = [made | {"provenance": made["provenance"] | {"quiet": False}} for made in (OURS, GAMG)]
     page, _ = told(records, busy)

@@ -206,16 +206,16 @@ def short(found):
     """For the README."""
     rows = []
     for name, nodes in cases(found):
-        summary = found[(name, nodes), OURS][0][0]["summary"]
-        start = [name, thousands(summary["nodes"]), counts(summary)[-1]]
-        for peer in SCENES[name].peers:
-            if ((name, nodes), peer) not in found:
-                continue
-            records, ours = found[(name, nodes), peer]
-            if ended(records):
-                cells = [no_result(peer, records, ours, 3)[2], "", ""]
-            else:
-                cells = [beside(records, ours, value) for value in (seconds_of, linear_seconds, memory_of)]
-            rows.append([*start, measured(ours, ours, seconds_of)[0], peer, *cells])
+        records, _ = found[(name, nodes), OURS]
+        summary = records[0]["summary"]
+        start = [name, thousands(summary["nodes"]), counts(summary)[-1], measured(records, records, seconds_of)[0]]
+        there = [peer for peer in SCENES[name].peers if ((name, nodes), peer) in found]
+        rows += [[*start, *times_of(peer, *found[(name, nodes), peer])] for peer in there] or [[*start, *[""] * 4]]
     head = ["", "nodes", "F a Newton step", "seconds", "beside", "times seconds", "times linear seconds", "times memory"]
     return SHORT + table(head, rows) if rows else ""
+
+
+def times_of(peer, records, ours):
+    if ended(records):
+        return [peer, no_result(peer, records, ours, 3)[2], "", ""]
+    return [peer, *(beside(records, ours, value) for value in (seconds_of, linear_seconds, memory_of))]
