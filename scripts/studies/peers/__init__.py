@@ -32,8 +32,8 @@ HEAD = """\
 Written by `scripts/bench write peers` from the runs in [raw/peers](raw/peers), which `scripts/bench run peers` made.
 
 Programs alternate within one run on one machine. Seconds are wall time from the start of the processes to results on disk,
-start-up of MPI and Python included; those of CalculiX are of `ccx`, without the writing of its input. Medians of the
-repetitions, with the smallest and largest. "Times fetiplast" divides by the median of fetiplast in the same run. Memory is the
+start-up of MPI and Python included; those of CalculiX are of `ccx`, without the writing of its input, and of a single run.
+Medians of the repetitions, with the smallest and largest. "Times fetiplast" divides by the median of fetiplast in the same run. Memory is the
 sum over the ranks of their largest resident memory.
 """
 

@@ -6,7 +6,7 @@ import sys
 from .. import measure
 from ..measure import RESULTS
 from ..pages import table
-from .records import FOLDER, OURS, PYTHON, RANKS, ended, memory_of, middle, no_result, program_of, seconds_of, spread
+from .records import FOLDER, ONCE, OURS, PYTHON, RANKS, ended, memory_of, middle, no_result, program_of, seconds_of, spread
 
 PEERS = {
     "petsc-gamg": ["--coarsest", "gamg"],
@@ -53,7 +53,8 @@ def run_of(program, level, ours):
     if program == OURS:
         return measure.Run(label, ["two-blocks", *options], RANKS)
     if program == "calculix":
-        return measure.Run(label, [*options, "--threads", str(RANKS)], RANKS, [sys.executable, str(FOLDER / "calculix.py")])
+        start = [sys.executable, str(FOLDER / "calculix.py")]
+        return measure.Run(label, [*options, "--threads", str(RANKS)], RANKS, start, once=program in ONCE)
     start = [*ours.on(RANKS, PYTHON), str(FOLDER / "petsc.py")]
     return measure.Run(label, [*PEERS[program], *options], RANKS, start)
 

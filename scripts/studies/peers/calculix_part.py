@@ -18,7 +18,7 @@ import numpy as np
 import part
 
 PENALTY = 1e5
-"""Pressure per overclosure, MPa/mm."""
+"""Pressure per overclosure, MPa/mm. Ten times as much takes more than twice the iterations on the flange."""
 SIDES = np.array([1, 2, 4, 3])
 """What CalculiX calls the faces of a C3D4 in the order of `part.FACES`."""
 

@@ -11,6 +11,11 @@ RAW = measure.RAW / "peers"
 RANKS = 2
 OURS = "fetiplast"
 
+EXACT = "fetiplast-tight"
+"""A reference: the same scene, solved as exactly as rounding allows."""
+ONCE = {EXACT, "calculix"}
+"""Programs that are not repeated: what takes ten times as long needs no median."""
+
 PYTHON = "/usr/bin/python3"
 """Debian's, which has Debian's petsc4py."""
 

@@ -12,13 +12,9 @@ from ..groups import thousands
 from ..hard import TIGHT
 from ..measure import ROOT
 from ..pages import table
-from .records import FOLDER, OURS, PYTHON, RANKS, ended, memory_of, middle, no_result, seconds_of, spread
+from .records import EXACT, FOLDER, ONCE, OURS, PYTHON, RANKS, ended, memory_of, middle, no_result, seconds_of, spread
 
 FILES = ROOT / "scenes/peers"
-EXACT = "fetiplast-tight"
-"""The reference: the same scene, solved as exactly as rounding allows."""
-ONCE = {EXACT, "calculix"}
-"""Programs that are not repeated: what takes ten times as long needs no median."""
 
 
 class Scene(typing.NamedTuple):
@@ -63,7 +59,7 @@ The programs:
   those tried. Not run on the flange: its contact is not node to node.
 - **calculix** ([calculix_part.py](../scripts/studies/peers/calculix_part.py)): as for the benchmark, with as much of the load in
   an increment as it manages: all on the floor, a fifth with the flange. The floor is a fixed brick. Contact integrals, penalty
-  and increments differ from fetiplast's, and so do results. Run once.
+  and increments differ from fetiplast's, and so do results.
 
 *Linear seconds* are what linear systems take, messages included. Of fetiplast: F, preconditioner, factors, coarse problem, and
 all that is no assembly, residual, input or output; each on its slowest rank. Of PETSc: set-up and solve of KSP, without Python.
