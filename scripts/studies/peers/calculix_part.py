@@ -19,6 +19,8 @@ import part
 
 PENALTY = 1e5
 """Pressure per overclosure, MPa/mm. Ten times as much takes more than twice the iterations on the flange."""
+CYCLES = 25
+"""Iterations after which an increment is cut back. CalculiX waits for 60, in which the flange goes round in cycles."""
 SIDES = np.array([1, 2, 4, 3])
 """What CalculiX calls the faces of a C3D4 in the order of `part.FACES`."""
 
@@ -42,7 +44,8 @@ def write(file, given, options):
     ccx.lines(file, ([n + 1, c + 1, c + 1] for n, c in np.argwhere(given.fixed).tolist()))
     for contact in given.contacts:
         write_contact(file, given, elements, contact)
-    print(f"*STEP,INC=200\n*STATIC,SOLVER={options.solver}\n{options.increment},1.,1e-5,{options.increment}\n*CLOAD", file=file)
+    print(f"*STEP,INC=200\n*CONTROLS,PARAMETERS=CONTACT\n0.001,0.1,100,{CYCLES}", file=file)
+    print(f"*STATIC,SOLVER={options.solver}\n{options.increment},1.,1e-5,{options.increment}\n*CLOAD", file=file)
     loaded = np.argwhere(given.forces)
     values = given.forces[tuple(loaded.T)].tolist()
     file.writelines(f"{n + 1},{c + 1},{value:.12g}\n" for (n, c), value in zip(loaded.tolist(), values))
