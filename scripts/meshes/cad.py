@@ -10,13 +10,14 @@ def start():
 
 
 def name(volumes, surfaces):
-    """Names volumes, and those of their surfaces for which a name's rule holds: a function of the volume's name and of the
-    lowest and highest corner of the surface's box. The first rule counts."""
+    """Names volumes, each of one solid or of a list of them, and those of their surfaces for which a name's rule holds: a
+    function of the volume's name and of the lowest and highest corner of the surface's box. The first rule counts."""
     gmsh.model.occ.synchronize()
     found = {}
-    for number, (volume, tag) in enumerate(volumes.items(), start=1):
-        gmsh.model.addPhysicalGroup(3, [tag], number, volume)
-        for _, surface in gmsh.model.getBoundary([(3, tag)], oriented=False):
+    for number, (volume, solids) in enumerate(volumes.items(), start=1):
+        tags = solids if isinstance(solids, list) else [solids]
+        gmsh.model.addPhysicalGroup(3, tags, number, volume)
+        for _, surface in gmsh.model.getBoundary([(3, tag) for tag in tags], oriented=False):
             box = gmsh.model.getBoundingBox(2, surface)
             for rule_name, holds in surfaces.items():
                 if holds(volume, box[:3], box[3:]):
@@ -60,3 +61,14 @@ def write(size, path, largest, factors=None):
 def growing(h, slope, distance, within):
     """The formula of elements of width `h` within a distance from somewhere, growing with a slope beyond."""
     return f"{h} + {slope} * ({distance} - {within} + Fabs({distance} - {within})) / 2"
+
+
+def beside(surfaces, least, most, reach):
+    """The formula of elements that are `least` wide at surfaces and grow to `most` within a distance."""
+    field = gmsh.model.mesh.field
+    distance, width = field.add("Distance"), field.add("Threshold")
+    field.setNumbers(distance, "SurfacesList", surfaces)
+    field.setNumber(distance, "Sampling", 60)
+    for key, value in {"InField": distance, "SizeMin": least, "SizeMax": most, "DistMin": 1.0, "DistMax": reach}.items():
+        field.setNumber(width, key, value)
+    return f"F{width}"

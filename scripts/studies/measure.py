@@ -38,6 +38,8 @@ class Run(typing.NamedTuple):
     ranks: int
     start: list | None = None
     """How the command begins where it is another program's, which takes --out DIR and leaves DIR/summary.json."""
+    once: bool = False
+    """Not repeated: what others are compared with."""
 
 
 class Program:
@@ -108,7 +110,7 @@ def run(runs, arguments, folder, tables=(), program=None, limit=None):
     program = program or Program(arguments)
     records, failed = program.records(folder), 0
     for repetition in range(1, arguments.repeat + 1):
-        for run in runs:
+        for run in (run for run in runs if repetition == 1 or not run.once):
             record = {**run.label, **solve(program, run, folder, limit)}
             record["repetition"] = repetition
             record["provenance"] |= program.provenance(record["summary"])

@@ -1,14 +1,27 @@
 """Files that are made from others: written, or only compared. Tables in Markdown."""
 
+import re
 import sys
 
 from .measure import ROOT
+
+MARKED = re.compile(r"(<!-- measured: written by scripts/bench write (\w+) -->\n).*?(<!-- /measured -->)", re.DOTALL)
 
 
 def table(head, rows):
     """First column to the left, the others to the right."""
     lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+
+
+def filled(parts):
+    """The README and the pages of docs with their marked parts replaced: texts by the name of the study."""
+
+    def text(part):
+        return f"{part[1]}{parts[part[2]]}{part[3]}" if part[2] in parts else part[0]
+
+    documents = (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
+    return {file: MARKED.sub(text, file.read_text()) for file in documents}
 
 
 def write(files, only_check=False):

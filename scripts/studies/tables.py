@@ -8,16 +8,14 @@ of their own: for a cluster, see jobs/table1 and jobs/table2.
 import itertools
 import json
 import pathlib
-import re
 import sys
 
 from . import kernels, measure, plot
 from .groups import Group, circumstances, measured, thousands
-from .measure import RESULTS, ROOT, Run
+from .measure import RESULTS, Run
 from .pages import table
 
 RAW = measure.RAW / "tables"
-MARKED = re.compile(r"(<!-- measured:.*?-->\n).*?(<!-- /measured -->)", re.DOTALL)
 
 
 class Variant:
@@ -496,12 +494,16 @@ def table_2(levels, heading):
         yield result_table(groups, REFERENCES.get(str(level), {}))
 
 
+def short():
+    """For the README."""
+    return scalability(Levels(by_level(read(RAW), RANKS), PAPER["table2"]), RANKS)
+
+
 def pages():
     groups = read(RAW)
     levels = by_level(groups, RANKS)
     all_levels = Levels(levels, PAPER["table2"])
-    short = scalability(all_levels, RANKS)
-    text = [HEAD, "## Table 2 in short\n", short, "![Multiplications by F against subdomains](scalability.svg)\n"]
+    text = [HEAD, "## Table 2 in short\n", scalability(all_levels, RANKS), "![Multiplications by F against subdomains](scalability.svg)\n"]
     text += [f"## Growth, level {GROWTH_FROM} = 1\n", growth(all_levels)]
     if levels:
         text += ["## Accuracy: residuals, and relative difference from independent programs\n"]
@@ -519,10 +521,7 @@ def pages():
     x_values = sorted({x for _, points in series for x in points})
     chart = plot.chart("Multiplications by F, all Newton steps", "subdomains", "multiplications", x_values, series)
 
-    files = {RESULTS / "tables.md": "\n".join(text), RESULTS / "scalability.svg": chart}
-    for file in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
-        files[file] = MARKED.sub(lambda part: f"{part[1]}{short}{part[2]}", file.read_text())
-    return files
+    return {RESULTS / "tables.md": "\n".join(text), RESULTS / "scalability.svg": chart}
 
 
 def table_of(number, folder, variants, levels, ranks):

@@ -10,15 +10,10 @@ engineer has the mesh already. Needs nothing but Python and ccx.
 
 import argparse
 import itertools
-import json
 import math
-import os
-import pathlib
-import re
-import resource
-import subprocess
 import sys
-import time
+
+import ccx
 
 INCREMENTS = 5
 PENALTY = 1e5
@@ -39,7 +34,7 @@ def write(file, n):
         return 1 + body * per_body + (x * (ny + 1) + y) * (nz + 1) + z
 
     def lines(rows):
-        file.writelines(",".join(map(str, row)) + "\n" for row in rows)
+        ccx.lines(file, rows)
 
     def numbers(values):
         lines([value] for value in values)
@@ -88,55 +83,24 @@ def write(file, n):
     )
 
 
-def read(directory):
-    """Contact force, largest displacement and plastic elements of the last increment, and the iterations of all."""
-    blocks, rows = {}, []
-    for line in (directory / "two_blocks.dat").read_text().splitlines():
-        words = line.split()
-        if words and not re.match(r"[-+0-9.]", words[0]):
-            kind = words[0] if words[0] != "total" else "total force"
-            rows = blocks[kind] = []  # a later increment replaces the one before
-        elif words:
-            rows.append([float(word) for word in words])
-    iterations = len((directory / "two_blocks.cvg").read_text().splitlines()) - 4
-    increments = [line.split() for line in (directory / "two_blocks.sta").read_text().splitlines()[2:]]
+def found(blocks):
+    """Contact force, largest displacement and plastic elements."""
     return {
         "contact_force": blocks["total force"][0][2],
         "max_displacement": max(math.hypot(*row[1:]) for row in blocks["displacements"]),
         "plastic_elements": sum(row[2] > 0 for row in blocks["equivalent"]),
-        "iterations": iterations,
-        "increments": len(increments),
-        "load": float(increments[-1][4]),
     }
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--level", type=int, default=1)
-    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out"))
-    parser.add_argument("--threads", type=int, default=2)
+    ccx.add_arguments(parser)
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     with open(arguments.out / "two_blocks.inp", "w") as file:
         write(file, arguments.level)
-
-    environment = os.environ | {"OMP_NUM_THREADS": str(arguments.threads), "OPENBLAS_NUM_THREADS": "1"}
-    begin = time.perf_counter()
-    done = subprocess.run(["ccx", "two_blocks"], cwd=arguments.out, env=environment, capture_output=True, text=True)
-    seconds = time.perf_counter() - begin
-    (arguments.out / "ccx.log").write_text(done.stdout + done.stderr)
-    summary = {"level": arguments.level, "time_total": seconds, "converged": False}
-    summary["peak_rss_mb"] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    version = re.search(r"Version (\S+)", done.stdout)
-    summary["calculix"] = version.group(1).rstrip(",") if version else "unknown"
-    if done.returncode == 0 and "Job finished" in done.stdout:
-        summary |= read(arguments.out)
-        summary["converged"] = abs(summary["load"] - 1) < 1e-6
-    else:
-        print((done.stdout + done.stderr)[-2000:], file=sys.stderr)
-    (arguments.out / "summary.json").write_text(json.dumps(summary) + "\n")
-    print(json.dumps(summary))
-    return 0 if summary["converged"] else 1
+    return ccx.solve("two_blocks", found, arguments)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ vectorised over the cells. Writes DIR/summary.json and, one file a rank, DIR/fie
 import argparse
 import json
 import pathlib
-import resource
 import sys
 import time
 
@@ -23,68 +22,19 @@ import petsc4py  # noqa: E402
 
 petsc4py.init(sys.argv[:1])
 import numpy as np  # noqa: E402
-import scipy.sparse  # noqa: E402
-from mpi4py import MPI  # noqa: E402
-from petsc4py import PETSc  # noqa: E402
+from linear import OPTIONS, Blocks, Linear, circumstances, rigid_modes  # noqa: E402
+from newton import Step, newton, summary  # noqa: E402
+from plasticity import Material  # noqa: E402
+from ranks import COMM, MPI, total  # noqa: E402
 
-YOUNG, POISSON, YIELD, HARDENING, PRESSURE = 210000.0, 0.29, 450.0, 10000.0, 150.0
-NEWTON_TOLERANCE, RESIDUAL_TOLERANCE, NEWTON_LIMIT = 1e-4, 1e-6, 40
-LOOSEST = 1e-2
-"""Relative tolerance of the first linear solves; later ones follow the residual (Eisenstat and Walker)."""
-
-MU = YOUNG / (2 * (1 + POISSON))
-BULK = YOUNG / (3 * (1 - 2 * POISSON))
-RADIUS = np.sqrt(2 / 3) * YIELD
-BETA = 2 * MU / (2 * MU + 2 * HARDENING / 3)
-ONE = np.array([1.0, 1, 1, 0, 0, 0])
-DEVIATOR = np.diag([1, 1, 1, 0.5, 0.5, 0.5]) - np.outer(ONE, ONE) / 3  # engineering strain (xx yy zz xy yz xz) to tensor
-ELASTIC = BULK * np.outer(ONE, ONE) + 2 * MU * DEVIATOR
+STEEL = Material(young=210000.0, poisson=0.29, yield_stress=450.0, hardening=10000.0)
+PRESSURE = 150.0
 
 CORNER = np.array([[v & 1, v >> 1 & 1, v >> 2] for v in range(8)])
 TETS = np.array([(0, 1, 2, 5), (0, 2, 4, 5), (2, 4, 5, 6), (1, 3, 2, 5), (3, 5, 7, 2), (2, 5, 7, 6)])
 STEPS = CORNER[TETS][:, None, :, :] - CORNER[TETS][:, :, None, :]  # tetrahedron, from, to: step in the grid
 OFFSETS, CODES = np.unique(STEPS.reshape(-1, 3), axis=0, return_inverse=True)
 CODES = CODES.reshape(6, 4, 4)  # which of the 15 offsets a step is
-COMM = MPI.COMM_WORLD
-
-OPTIONS = {
-    "gamg": {
-        "ksp_type": "cg",
-        "ksp_norm_type": "unpreconditioned",
-        "ksp_max_it": 1000,
-        "pc_type": "gamg",
-        "pc_gamg_agg_nsmooths": 1,
-        "pc_gamg_reuse_interpolation": True,
-        "pc_gamg_threshold": 0.0,
-        "pc_gamg_coarse_eq_limit": 300,
-        "pc_gamg_esteig_ksp_max_it": 10,
-        "mg_levels_ksp_type": "chebyshev",
-        "mg_levels_ksp_max_it": 2,
-        "mg_levels_pc_type": "jacobi",
-    },
-    # CHOLMOD knows one process only, so every rank factorises the whole matrix: no slower than on one rank.
-    "cholmod": {
-        "ksp_type": "preonly",
-        "pc_type": "redundant",
-        "redundant_ksp_type": "preonly",
-        "redundant_pc_type": "cholesky",
-        "redundant_pc_factor_mat_solver_type": "cholmod",
-    },
-    "mumps": {
-        "ksp_type": "preonly",
-        "pc_type": "cholesky",
-        "pc_factor_mat_solver_type": "mumps",
-        "mat_mumps_icntl_14": 40,
-    },
-}
-
-
-def total(value, operation=MPI.SUM):
-    return COMM.allreduce(value, operation)
-
-
-def dot(a, b):
-    return total(float(np.vdot(a, b)))
 
 
 def strain_matrices(h):
@@ -210,6 +160,10 @@ class Problem:
                 COMM.Sendrecv(outgoing, other, recvbuf=incoming, source=other)
         return full
 
+    def points(self):
+        """About the middle, in metres."""
+        return (self.grid * self.h + np.array([0, 0, 1000.0]) * self.body[:, None] - [1800, 500, 1000]) / 1000
+
     def load(self):
         """Pressure on the whole top of the upper body."""
         x, y = np.meshgrid(np.arange(self.shift, self.shift + self.nx), np.arange(self.ny), indexing="ij")
@@ -223,7 +177,8 @@ class Problem:
 class Equations:
     """Stresses, forces and tangents."""
 
-    def __init__(self, problem):
+    def __init__(self, problem, solver):
+        self.load, self.linear = problem.load(), Linear(Blocks(problem.row_start, problem.column, problem.size), solver)
         self.p, self.volume, self.strain_matrix = problem, problem.h**3 / 6, strain_matrices(problem.h)
         own_row = np.arange(problem.high - problem.low + 1) - (problem.r0 - problem.low)
         self.row = np.where((own_row >= 0) & (own_row < problem.own), own_row, problem.own)
@@ -234,7 +189,7 @@ class Equations:
         ]
         self.elastic = np.zeros((problem.blocks + 1, 9))
         for t in range(6):
-            self.add(self.elastic, t, slice(None), (ELASTIC.reshape(1, 36) @ self.expand[t]).reshape(1, 16, 9))
+            self.add(self.elastic, t, slice(None), (STEEL.elastic.reshape(1, 36) @ self.expand[t]).reshape(1, 16, 9))
 
     def add(self, values, t, cells, stiffness):
         """In one tetrahedron of different cells, node a is a different row each time, so += is enough."""
@@ -246,6 +201,35 @@ class Equations:
     def state(self, u):
         return State(self, u)
 
+    def norm(self, strain):
+        inner = strain[:, self.p.mine].reshape(-1, 6)
+        return np.sqrt(total(self.volume * float(np.vdot(inner @ STEEL.elastic, inner))))
+
+    def gap(self, u):
+        return u[self.p.slave, 2] - u[self.p.master, 2]
+
+    def free(self, force, active):
+        """Of the unknowns that are left after the elimination."""
+        left = force.copy()
+        onto_master(self.p, left, active)
+        return left
+
+    def step(self, state, active, tolerance):
+        p, gap, values = self.p, self.gap(state.u), state.tangent()
+        of_slaves = values[p.entry[p.slave].reshape(len(p.slave), -1)][:, :, 2, :]
+        right = self.load - state.force
+        diagonal = eliminate(p, values, right, active, gap)
+        modes = rigid_modes(p.points())
+        modes[p.slave[active], 2] = 0
+        step, iterations = self.linear.solve(values[:-1], right, tolerance, active, modes)
+        del values
+        step[p.slave[active], 2] = step[p.master[active], 2]
+        closing = np.zeros_like(state.u)
+        closing[p.slave[active], 2] = -gap[active]
+        around = p.with_ghosts(step + closing)[p.neighbour[p.slave].reshape(len(p.slave), -1)]
+        pressure = (state.force - self.load)[p.slave, 2] + np.einsum("skc,skc->s", of_slaves, around)
+        return Step(step, closing, pressure, diagonal, iterations)
+
 
 class State:
     """What displacements entail."""
@@ -256,18 +240,8 @@ class State:
         self.strain = np.empty((6, count, 6))
         for t, tet in enumerate(TETS):
             np.matmul(full[p.cell[:, tet]].reshape(count, 12), equations.strain_matrix[t].T, out=self.strain[t])
-        stress = self.strain.reshape(-1, 6) @ (2 * MU * DEVIATOR)
-        square = stress * stress
-        norm = np.sqrt(square[:, :3].sum(1) + 2 * square[:, 3:].sum(1))
-        self.plastic = np.flatnonzero(norm > RADIUS)
-        self.norm = norm[self.plastic]
-        self.direction = stress[self.plastic] / self.norm[:, None]
-        stress[self.plastic] -= BETA * (self.norm - RADIUS)[:, None] * self.direction
-        trace = self.strain.reshape(-1, 6)[:, :3].sum(1)
-        stress[:, :3] += BULK * trace[:, None]
-        self.stress = stress.reshape(6, count, 6)
-        self.dense = norm**2 / (4 * MU) + BULK / 2 * trace**2
-        self.dense[self.plastic] -= BETA * (self.norm - RADIUS) ** 2 / (4 * MU)
+        self.response = STEEL.respond(self.strain.reshape(-1, 6))
+        self.stress = self.response.stress.reshape(6, count, 6)
         on_cell = np.zeros((8, count, 3))
         for t, tet in enumerate(TETS):
             force = (equations.volume * self.stress[t] @ equations.strain_matrix[t]).reshape(count, 4, 3)
@@ -281,90 +255,23 @@ class State:
     def tangent(self):
         """Blocks of the stiffness."""
         values, count = self.equations.elastic.copy(), len(self.equations.p.cell)
-        bounds = np.searchsorted(self.plastic, np.arange(7) * count)
+        plastic = self.response.plastic
+        bounds = np.searchsorted(plastic, np.arange(7) * count)
         for t in range(6):
             for begin in range(bounds[t], bounds[t + 1], 20000):
                 part = slice(begin, min(begin + 20000, bounds[t + 1]))
-                ratio = (RADIUS / self.norm[part])[:, None, None]
-                normal = self.direction[part]
-                change = -2 * MU * BETA * ((1 - ratio) * DEVIATOR + ratio * normal[:, :, None] * normal[:, None, :])
+                change = STEEL.softening(self.response, part)
                 stiffness = (change.reshape(-1, 36) @ self.equations.expand[t]).reshape(-1, 16, 9)
-                self.equations.add(values, t, self.plastic[part] - t * count, stiffness)
+                self.equations.add(values, t, plastic[part] - t * count, stiffness)
         values[-1] = 0
         return values.reshape(-1, 3, 3)
 
     def energy(self):
         """Psi of the whole, every cell counted by one rank."""
-        return total(self.equations.volume * float(self.dense.reshape(6, -1)[:, self.equations.p.mine].sum()))
+        return total(self.equations.volume * float(self.response.dense.reshape(6, -1)[:, self.equations.p.mine].sum()))
 
     def plastic_elements(self):
-        return total(int(self.equations.p.mine[self.plastic % len(self.equations.p.mine)].sum()))
-
-
-def elastic_norm(equations, strain):
-    inner = strain[:, equations.p.mine].reshape(-1, 6)
-    return np.sqrt(total(equations.volume * float(np.vdot(inner @ ELASTIC, inner))))
-
-
-class Linear:
-    """The linear systems of one level, all of one pattern."""
-
-    def __init__(self, problem, solver):
-        self.p, self.solver = problem, solver
-        self.matrix = self.ksp = self.active = None
-        self.sizes = (3 * problem.own, 3 * problem.size)
-        options = PETSc.Options()
-        for key, value in OPTIONS[solver].items():
-            options[f"{solver}_{key}"] = value
-
-    def solve(self, values, right, tolerance, active):
-        p = self.p
-        csr = scipy.sparse.bsr_matrix((values[:-1], p.column, p.row_start), shape=(3 * p.own, 3 * p.size)).tocsr()
-        if self.matrix is None:
-            csr = (csr.indptr, csr.indices, csr.data)
-            self.matrix = PETSc.Mat().createAIJ((self.sizes, self.sizes), bsize=3, csr=csr, comm=COMM)
-            self.matrix.setOption(PETSc.Mat.Option.SPD, True)
-        else:
-            self.matrix.setValuesCSR(csr.indptr, csr.indices, csr.data)
-            self.matrix.assemble()
-        del csr
-        if self.solver == "gamg":
-            self.matrix.setNearNullSpace(self.rigid_modes(active))
-            # GAMG keeps its interpolation, which does not fit other pairs in contact.
-            if self.active is None or total(int((self.active != active).sum())):
-                self.close()
-            self.active = active
-        if self.ksp is None:
-            self.ksp = PETSc.KSP().create(COMM)
-            self.ksp.setOptionsPrefix(f"{self.solver}_")
-            self.ksp.setFromOptions()
-            self.ksp.setOperators(self.matrix)
-        self.ksp.setTolerances(rtol=tolerance)
-        right = PETSc.Vec().createWithArray(right.ravel(), self.sizes, bsize=3, comm=COMM)
-        solution = right.duplicate()
-        self.ksp.solve(right, solution)
-        if self.ksp.getConvergedReason() <= 0:
-            raise RuntimeError(f"the linear solver failed: {self.ksp.getConvergedReason()}")
-        return solution.array.reshape(-1, 3).copy(), self.ksp.getIterationNumber()
-
-    def close(self):
-        if self.ksp is not None:
-            self.ksp.destroy()
-            self.ksp = None
-
-    def rigid_modes(self, active):
-        modes = np.zeros((self.p.own, 3, 6))
-        x, y, z = (self.p.grid * self.p.h + np.array([0, 0, 1000.0]) * self.p.body[:, None] - [1800, 500, 1000]).T / 1000
-        modes[:, [0, 1, 2], [0, 1, 2]] = 1
-        modes[:, 0, 3], modes[:, 1, 3] = -y, x
-        modes[:, 1, 4], modes[:, 2, 4] = -z, y
-        modes[:, 0, 5], modes[:, 2, 5] = z, -x
-        modes[self.p.slave[active], 2] = 0
-        modes = modes.reshape(-1, 6)
-        root = np.linalg.cholesky(total(modes.T @ modes))
-        modes = np.linalg.solve(root, modes.T)
-        vectors = [PETSc.Vec().createWithArray(mode.copy(), self.sizes, bsize=3, comm=COMM) for mode in modes]
-        return PETSc.NullSpace().create(vectors=vectors, comm=COMM)
+        return total(int(self.equations.p.mine[self.response.plastic % len(self.equations.p.mine)].sum()))
 
 
 def eliminate(p, values, right, active, gap):
@@ -392,72 +299,6 @@ def eliminate(p, values, right, active, gap):
 def onto_master(p, force, active):
     force[p.master[active], 2] += force[p.slave[active], 2]
     force[p.slave[active], 2] = 0
-
-
-def step_length(slope, before, after):
-    """Zero of the energy's slope along the step, roughly; the full step unless that overshoots."""
-    if before >= 0 or after <= 0.5 * abs(before):
-        return 1.0
-    low, high, at_low, at_high, tried = 0.0, 1.0, before, after, 1.0
-    for _ in range(7):
-        tried = low - (high - low) * at_low / (at_high - at_low)
-        tried = min(max(tried, low + 0.1 * (high - low)), high - 0.1 * (high - low))
-        found = slope(tried)
-        if abs(found) < 0.2 * abs(before):
-            break
-        if found > 0:
-            high, at_high = tried, found
-        else:
-            low, at_low = tried, found
-    return tried
-
-
-def newton(p, solver, u, active):
-    equations, linear, load = Equations(p), Linear(p, solver), p.load()
-    state, scale = equations.state(u), np.sqrt(dot(load, load))
-    norm, before, tolerance, rows, converged = elastic_norm(equations, state.strain), None, LOOSEST, [], False
-    while len(rows) < NEWTON_LIMIT and not converged:
-        values = state.tangent()
-        gap = u[p.slave, 2] - u[p.master, 2]
-        of_slaves = values[p.entry[p.slave].reshape(len(p.slave), -1)][:, :, 2, :]
-        right = load - state.force
-        diagonal = eliminate(p, values, right, active, gap)
-        step, iterations = linear.solve(values, right, tolerance, active)
-        del values
-        step[p.slave[active], 2] = step[p.master[active], 2]
-        closing = np.zeros_like(u)
-        closing[p.slave[active], 2] = -gap[active]
-        around = p.with_ghosts(step + closing)[p.neighbour[p.slave].reshape(len(p.slave), -1)]
-        pressure = (state.force - load)[p.slave, 2] + np.einsum("skc,skc->s", of_slaves, around)
-
-        closed = total(int(np.count_nonzero(closing))) > 0
-        at_start = equations.state(u + closing) if closed else state
-        new = equations.state(u + closing + step)
-
-        def slope(length, known=None):
-            return dot((known or equations.state(u + closing + length * step)).force - load, step)
-
-        length = step_length(slope, slope(0, at_start), slope(1, new))
-        if length != 1:
-            new = equations.state(u + closing + length * step)
-        new_norm = elastic_norm(equations, new.strain)
-        criterion = elastic_norm(equations, new.strain - state.strain) / (norm + new_norm)
-        u, state, norm = new.u, new, new_norm
-        wanted = pressure - diagonal * (u[p.slave, 2] - u[p.master, 2]) > 0
-        changed = total(int((wanted != active).sum()))
-        active = wanted
-        left = load - state.force
-        onto_master(p, left, active)
-        residual = np.sqrt(dot(left, left)) / scale
-        if before is not None:
-            tolerance = min(LOOSEST, max(0.9 * (residual / before) ** 2, 1e-8, 0.1 * RESIDUAL_TOLERANCE / residual))
-        before = residual
-        row = {"criterion": criterion, "residual": residual, "damping": length, "iterations": iterations, "changed": changed}
-        row |= {"plastic_elements": state.plastic_elements(), "active_contacts": total(int(active.sum()))}
-        rows.append(row)
-        converged = bool(changed == 0 and length == 1 and criterion < NEWTON_TOLERANCE and residual < RESIDUAL_TOLERANCE)
-    linear.close()
-    return state, load, active, rows, converged
 
 
 def refine(values, m, n):
@@ -490,7 +331,7 @@ def main():
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
 
-    levels, coarser = [], None
+    levels, coarser, linear = [], None, {}
     for n in range(1, arguments.level + 1) if arguments.cascade == "on" else [arguments.level]:
         begin = time.perf_counter()
         p = Problem(n)
@@ -499,38 +340,25 @@ def main():
             whole, touching = np.stack([refine(of_body, n - 1, n) for of_body in coarser[0]]), refine(coarser[1], n - 1, n)
             u = whole[p.body, p.grid[:, 0] - p.shift * p.body, p.grid[:, 1], p.grid[:, 2]]
             active = touching[p.pair[0], p.pair[1], 0] > 0.5
-        state, load, active, rows, converged = newton(p, arguments.solver if coarser else arguments.coarsest, u, active)
+        equations = Equations(p, arguments.solver if coarser else arguments.coarsest)
+        state, active, rows, converged = newton(equations, u, active)
+        equations.linear.close()
+        for name, taken in equations.linear.seconds.items():
+            linear[name] = linear.get(name, 0.0) + taken
         coarser = spread(p, state.u, active)
         levels.append({"level": n, "seconds": time.perf_counter() - begin, "unknowns": 3 * p.size, "newton": rows})
         if COMM.rank == 0:
             print(f"level {n}: {len(rows)} Newton steps, {sum(r['iterations'] for r in rows)} linear iterations, "
                   f"residual {rows[-1]['residual']:.1e}, {levels[-1]['seconds']:.1f} s", flush=True)
 
-    contact = (state.force - load)[p.slave, 2]
-    np.savez(arguments.out / f"fields-{COMM.rank}.npz", body=p.body, grid=p.grid, displacement=state.u, load=load,
+    contact = (state.force - equations.load)[p.slave, 2]
+    np.savez(arguments.out / f"fields-{COMM.rank}.npz", body=p.body, grid=p.grid, displacement=state.u, load=equations.load,
              stress=state.stress[:, p.mine], slave=p.slave, contact_force=contact)
-    work = dot(load, state.u)
-    summary = {
-        "converged": converged,
-        "level": arguments.level,
-        "ranks": COMM.size,
-        "newton_iterations": len(rows),
-        "iterations": sum(row["iterations"] for row in rows),
-        "contact_force": total(float(contact.sum())),
-        "energy": state.energy() - work,
-        "external_work": work,
-        "max_displacement": total(float(np.sqrt((state.u**2).sum(1)).max()), MPI.MAX),
-        "plastic_elements": rows[-1]["plastic_elements"],
-        "active_contacts": rows[-1]["active_contacts"],
-        "residual": rows[-1]["residual"],
-        "peak_rss_mb": total(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
-        "levels": levels,
-        "time_total": time.perf_counter() - STARTED,
-        "petsc": ".".join(str(number) for number in PETSc.Sys.getVersion()),
-    }
+    told = {"level": arguments.level, **summary(equations, state, rows, converged)}
+    told |= {"contact_force": total(float(contact.sum())), "levels": levels, **circumstances(STARTED, linear)}
     if COMM.rank == 0:
-        (arguments.out / "summary.json").write_text(json.dumps(summary) + "\n")
-        print(json.dumps({key: value for key, value in summary.items() if key != "levels"}))
+        (arguments.out / "summary.json").write_text(json.dumps(told) + "\n")
+        print(json.dumps({key: value for key, value in told.items() if key != "levels"}))
     return 0 if converged else 1
 
 
