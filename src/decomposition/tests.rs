@@ -233,6 +233,23 @@ fn a_body_of_several_pieces_is_cut_piece_by_piece() {
 }
 
 #[test]
+fn thin_plates_and_bodies_of_few_elements_are_cut() {
+    for (cells, size, parts) in
+        [([24, 24, 1], [1.0, 1.0, 1e-3], 16), ([1, 1, 1], [1.0; 3], 4), ([2, 1, 1], [1.0; 3], 40)]
+    {
+        let brick = Brick { origin: [0.0; 3], size, cells };
+        let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick.clone()), vec![0])]);
+        let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
+        let subdomains = tear(&torn, Cut::Metis(parts), Some(1), None, &Solo).subdomains;
+        subdomains.iter().for_each(assert_hangs_together);
+        let elements = brick.element_count() as usize;
+        assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
+        let wanted = parts.min(elements);
+        assert!(parts > elements || (wanted..=wanted * 5 / 4).contains(&subdomains.len()), "{}", subdomains.len());
+    }
+}
+
+#[test]
 fn regions_are_cut_one_by_one_by_their_size() {
     let mut mesh = mesh_of(&[Brick { origin: [0.0; 3], size: [1.0; 3], cells: [8, 4, 4] }]);
     // A quarter of the body between two parts of the rest.
