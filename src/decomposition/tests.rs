@@ -8,6 +8,7 @@ use crate::element::tet4::Tet4;
 use crate::element::{Element, Kind};
 use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis, two_meshes};
 use crate::mesh::brick::indices;
+use crate::mesh::faces::key;
 use crate::mesh::surface::area_vector;
 use crate::mesh::{Brick, Elements, Face, SolidMesh};
 use crate::model::discrete::discretise;
@@ -352,13 +353,19 @@ fn clusters_hang_together_and_are_the_same_on_any_ranks() {
         assert_eq!(alone.len(), wanted, "{:?}", scene.decomposition);
         for members in &alone {
             assert!(members.iter().all(|s| s.body == members[0].body));
-            // From the first by nodes that do not lie on an edge.
+            // From the first by whole faces of elements.
+            let faces = |s: &Subdomain| -> BTreeSet<Vec<u32>> {
+                let all = (0..s.elements.len()).flat_map(|e| (0..s.elements.kind().faces().len()).map(move |f| (e, f)));
+                let global =
+                    |(e, f)| s.elements.face(e, f).iter().map(|&n| s.nodes[n as usize] as u32).collect::<Vec<_>>();
+                all.map(|at| key(&global(at))).collect()
+            };
+            let faces: Vec<_> = members.iter().map(faces).collect();
             let mut reached = vec![0];
             for at in 0..members.len() {
                 let Some(&from) = reached.get(at) else { panic!("{} of {} members", reached.len(), members.len()) };
-                let nodes: BTreeSet<u64> = members[from].nodes.iter().copied().collect();
-                let shared = |to: usize| members[to].nodes.iter().filter(|node| nodes.contains(node)).count();
-                let next = (0..members.len()).filter(|to| !reached.contains(to) && shared(*to) > 3);
+                let next =
+                    (0..members.len()).filter(|&to| !reached.contains(&to) && !faces[to].is_disjoint(&faces[from]));
                 let next: Vec<usize> = next.collect();
                 reached.extend(next);
             }
