@@ -46,7 +46,7 @@ pub fn compact(centres: &[[f64; 3]], part: &mut [i32], parts: usize) {
 #[derive(Clone, Default)]
 struct Cell {
     centre: [f64; 3],
-    /// Mean square of distances from the centre.
+    /// Mean square of distances from the centre, the last that was not zero.
     spread: f64,
     weight: f64,
 }
@@ -78,10 +78,10 @@ fn move_centres(cells: &mut [Cell], points: &[[i32; 3]], part: &[i32]) {
         // count * squares - sum² is an integer, and no difference of large numbers is rounded.
         let around =
             u128::from(count) * squares - sum.iter().map(|&s| s.unsigned_abs() as u128).map(|s| s * s).sum::<u128>();
-        cell.spread = around as f64 / (count as f64).powi(2);
+        if around > 0 {
+            cell.spread = around as f64 / (count as f64).powi(2);
+        }
     }
-    let mean = cells.iter().map(|cell| cell.spread).sum::<f64>() / cells.len() as f64;
-    cells.iter_mut().for_each(|cell| cell.spread = cell.spread.max(0.1 * mean));
 }
 
 /// The nearest parts of each, itself first, and how far away they are.

@@ -2,9 +2,8 @@
 //! subdomains: the numbers of elements of bricks, which they generate, and all of other bodies.
 //!
 //! Regions of bodies are cut one by one: a part never spans two bodies or two materials. Elements of a body cost the same,
-//! as they have one kind; between bodies they count as so many linear tetrahedra. Contact surfaces stay on few subdomains
-//! because cutting between two elements at them counts as much as cutting `AT_CONTACT` other faces: on the benchmark, cut
-//! into 12 to 288 parts, that leaves 16 to 43 % fewer subdomains in contact for at most 5 % more dual unknowns.
+//! as they have one kind; between bodies they count as so many linear tetrahedra. Contact surfaces start on few
+//! subdomains because cutting between two elements at them counts as much as cutting `AT_CONTACT` other faces.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
@@ -27,6 +26,9 @@ use crate::sparse::ordering::alone;
 
 /// How much dearer it is to cut between two elements at a contact surface.
 const AT_CONTACT: i32 = 5;
+
+/// No part of a piece may have more than so many times the mean number of elements, unless METIS's own have.
+const LARGEST: f64 = 1.25;
 
 /// Cuts all bodies into about `parts` parts (more where a part had to be split to be face-connected), in clusters of about
 /// `cluster` neighbouring ones. Returns the clusters, the shares and this rank's subdomains. Collective.
@@ -222,7 +224,8 @@ impl<'a> DualGraph<'a> {
     }
 
     /// Part of each element of a piece; `local` has the places of its elements. METIS's parts are rods and have tongues, which
-    /// bend easily and cost iterations: they are made compact, then their faces smooth.
+    /// bend easily and cost iterations: they are made compact, then their faces smooth. Where that leaves too few parts or a
+    /// large one, as on meshes whose sizes differ much, only faces are made smooth, or nothing is done.
     fn cut(&self, piece: &[u32], local: &[i32], wanted: usize) -> Vec<i32> {
         let (begin, adjacency, weights) = self.graph(piece, local);
         let start = kway((&begin, &adjacency), &weights, wanted as i32, true);
@@ -231,10 +234,19 @@ impl<'a> DualGraph<'a> {
             |k: usize| adjacency[begin[k] as usize..begin[k + 1] as usize].iter().map(|&other| other as u32);
         let mut part = start.clone();
         compact(&centres, &mut part, wanted);
-        let parts = join(&mut part, wanted, neighbours);
-        smooth(&self.elements, piece, &mut part, parts);
-        let parts = join(&mut part, wanted, neighbours);
-        if parts < wanted { start } else { part }
+        join(&mut part, wanted, neighbours);
+        for mut part in [part, start.clone()] {
+            let before = part.iter().max().map_or(1, |last| *last as usize + 1);
+            smooth(&self.elements, piece, &mut part, before);
+            let parts = join(&mut part, wanted, neighbours);
+            let mut sizes = vec![0; parts];
+            part.iter().for_each(|&part| sizes[part as usize] += 1);
+            let largest = sizes.into_iter().max().unwrap_or(0);
+            if parts >= wanted && largest as f64 <= LARGEST * piece.len() as f64 / wanted as f64 {
+                return part;
+            }
+        }
+        start
     }
 
     /// Begins, neighbours and weights of the graph of a piece.
