@@ -328,7 +328,7 @@ mod tests {
     fn parts_are_balanced_and_more_compact_than_those_of_metis_with_as_few_shared_nodes() {
         let brick = Brick { origin: [0.0; 3], size: [3.0, 1.0, 1.0], cells: [24, 8, 8] };
         for (kind, wanted) in [(Kind::Tet4, 24), (Kind::Tet4, 60), (Kind::Hex8, 24)] {
-            let bodies = number_bodies([(kind, Shape::Brick(brick.clone()), vec![0])]);
+            let bodies = number_bodies([(kind, Shape::Brick(brick), vec![0])]);
             let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
             let graph = DualGraph::new(&torn, 0);
             let (part, count) = graph.partition(&mut std::iter::once(wanted));

@@ -239,7 +239,7 @@ fn thin_plates_and_bodies_of_few_elements_are_cut() {
         [([24, 24, 1], [1.0, 1.0, 1e-3], 16), ([1, 1, 1], [1.0; 3], 4), ([2, 1, 1], [1.0; 3], 40)]
     {
         let brick = Brick { origin: [0.0; 3], size, cells };
-        let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick.clone()), vec![0])]);
+        let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick), vec![0])]);
         let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
         let subdomains = tear(&torn, Cut::Metis(parts), Some(1), None, &Solo).subdomains;
         subdomains.iter().for_each(assert_hangs_together);
