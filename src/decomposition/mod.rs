@@ -6,9 +6,12 @@
 
 pub mod bricks;
 pub mod clusters;
+mod compact;
 pub mod cost;
+mod diffusion;
 pub mod interface;
 pub mod metis;
+mod pieces;
 pub mod shares;
 pub mod subdomain;
 pub mod sums;

@@ -8,6 +8,7 @@ use crate::element::tet4::Tet4;
 use crate::element::{Element, Kind};
 use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis, two_meshes};
 use crate::mesh::brick::indices;
+use crate::mesh::faces::key;
 use crate::mesh::surface::area_vector;
 use crate::mesh::{Brick, Elements, Face, SolidMesh};
 use crate::model::discrete::discretise;
@@ -233,6 +234,23 @@ fn a_body_of_several_pieces_is_cut_piece_by_piece() {
 }
 
 #[test]
+fn thin_plates_and_bodies_of_few_elements_are_cut() {
+    for (cells, size, parts) in
+        [([24, 24, 1], [1.0, 1.0, 1e-3], 16), ([1, 1, 1], [1.0; 3], 4), ([2, 1, 1], [1.0; 3], 40)]
+    {
+        let brick = Brick { origin: [0.0; 3], size, cells };
+        let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick), vec![0])]);
+        let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
+        let subdomains = tear(&torn, Cut::Metis(parts), Some(1), None, &Solo).subdomains;
+        subdomains.iter().for_each(assert_hangs_together);
+        let elements = brick.element_count() as usize;
+        assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
+        let wanted = parts.min(elements);
+        assert!(parts > elements || (wanted..=wanted * 5 / 4).contains(&subdomains.len()), "{}", subdomains.len());
+    }
+}
+
+#[test]
 fn regions_are_cut_one_by_one_by_their_size() {
     let mut mesh = mesh_of(&[Brick { origin: [0.0; 3], size: [1.0; 3], cells: [8, 4, 4] }]);
     // A quarter of the body between two parts of the rest.
@@ -335,13 +353,19 @@ fn clusters_hang_together_and_are_the_same_on_any_ranks() {
         assert_eq!(alone.len(), wanted, "{:?}", scene.decomposition);
         for members in &alone {
             assert!(members.iter().all(|s| s.body == members[0].body));
-            // From the first by nodes that do not lie on an edge.
+            // From the first by whole faces of elements.
+            let faces = |s: &Subdomain| -> BTreeSet<Vec<u32>> {
+                let all = (0..s.elements.len()).flat_map(|e| (0..s.elements.kind().faces().len()).map(move |f| (e, f)));
+                let global =
+                    |(e, f)| s.elements.face(e, f).iter().map(|&n| s.nodes[n as usize] as u32).collect::<Vec<_>>();
+                all.map(|at| key(&global(at))).collect()
+            };
+            let faces: Vec<_> = members.iter().map(faces).collect();
             let mut reached = vec![0];
             for at in 0..members.len() {
                 let Some(&from) = reached.get(at) else { panic!("{} of {} members", reached.len(), members.len()) };
-                let nodes: BTreeSet<u64> = members[from].nodes.iter().copied().collect();
-                let shared = |to: usize| members[to].nodes.iter().filter(|node| nodes.contains(node)).count();
-                let next = (0..members.len()).filter(|to| !reached.contains(to) && shared(*to) > 3);
+                let next =
+                    (0..members.len()).filter(|&to| !reached.contains(&to) && !faces[to].is_disjoint(&faces[from]));
                 let next: Vec<usize> = next.collect();
                 reached.extend(next);
             }
