@@ -72,12 +72,12 @@ pub fn two_bricks(sets: &[&str]) -> Scene {
     Scene::from_text(TEXT, "two bricks", 1, &owned(sets)).expect("the scene is sound")
 }
 
-/// Two bricks cut by METIS into about so many parts.
+/// Two bricks cut into about so many compact parts.
 pub fn two_bricks_by_metis(parts: usize) -> Scene {
     two_bricks(&[&format!("decomposition.subdomains={parts}")])
 }
 
-/// Two blocks of hexahedra and prisms from a mesh file, one over the other, cut by METIS into about so many parts.
+/// Two blocks of hexahedra and prisms from a mesh file, one over the other, cut into about so many compact parts.
 pub fn two_meshes(parts: usize) -> Scene {
     const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/meshes/hexes-and-prisms.msh");
     let text = format!(

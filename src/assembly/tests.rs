@@ -10,7 +10,7 @@ use crate::random::Random;
 use crate::scene::Scene;
 use crate::sparse::pattern::Pattern;
 
-/// A brick cut into boxes and into METIS parts, and a rod of one part.
+/// A brick cut into boxes and into compact parts, and a rod of one part.
 fn shapes() -> Vec<Scene> {
     vec![
         two_bricks(&[]),

@@ -115,6 +115,12 @@ pub fn decide(comm: &dyn Comm, choice: bool) -> bool {
     flag[0] != 0.0
 }
 
+/// Rank 0's integers, on every rank.
+pub fn from_root(comm: &dyn Comm, mine: Vec<u64>) -> Vec<u64> {
+    let outgoing = if comm.rank() == 0 { vec![mine; comm.size()] } else { vec![Vec::new(); comm.size()] };
+    comm.all_to_all(outgoing).swap_remove(0)
+}
+
 /// Integers of all ranks in rank order; lengths may differ.
 pub fn all_gather_u64(comm: &dyn Comm, mine: &[u64]) -> Vec<u64> {
     comm.all_to_all(vec![mine.to_vec(); comm.size()]).concat()

@@ -11,7 +11,7 @@ use crate::fixture::{
 };
 use crate::scene::Scene;
 
-/// Contact of subdomains that do not match, nodes with eight copies, METIS parts.
+/// Contact of subdomains that do not match, nodes with eight copies, compact parts.
 fn scenes() -> [Scene; 4] {
     [
         two_bricks(&[]),

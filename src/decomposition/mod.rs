@@ -6,12 +6,9 @@
 
 pub mod bricks;
 pub mod clusters;
-mod compact;
 pub mod cost;
-mod diffusion;
 pub mod interface;
-pub mod metis;
-mod pieces;
+mod parts;
 pub mod shares;
 pub mod subdomain;
 pub mod sums;
@@ -152,8 +149,6 @@ pub struct Bodies<'a> {
     pub meshes: &'a BTreeMap<usize, SolidMesh>,
     /// Named surfaces; facets and interface nodes refer to them by index.
     pub surfaces: &'a [Surface],
-    /// Indices of those that may touch another body.
-    pub contact: &'a [usize],
 }
 
 /// How to cut the bodies.
@@ -161,8 +156,8 @@ pub struct Bodies<'a> {
 pub enum Cut {
     /// Boxes of so many cells; all bodies are bricks, and these divide their cells.
     Bricks([usize; 3]),
-    /// So many parts in all, by METIS, at least one for each region of each body.
-    Metis(usize),
+    /// So many compact parts in all, at least one for each region of each body.
+    Parts(usize),
 }
 
 /// One rank's part of the torn bodies.
@@ -217,7 +212,7 @@ pub fn tear(
             let of_brick = |(id, (body, list)): (usize, ElementList)| Subdomain::of_brick(id, bodies, body, &list);
             (clusters, shares, ids.zip(lists).map(of_brick).collect())
         }
-        Cut::Metis(parts) => metis::own_subdomains(bodies, parts, cluster(parts), comm),
+        Cut::Parts(parts) => parts::own_subdomains(bodies, parts, cluster(parts), comm),
     };
     let interface = interface::share(comm, &subdomains);
     Decomposition { shares, clusters, subdomains, interface }

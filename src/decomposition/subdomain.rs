@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use super::{Bodies, BodyMesh, Patch, Surface};
 use crate::element::Kind;
+use crate::mesh::Elements;
 use crate::mesh::faces::{Neighbours, key};
-use crate::mesh::{Elements, SolidMesh};
 use crate::vector::difference;
 
 /// A face on a named surface.
@@ -98,26 +98,21 @@ impl Subdomain {
         Self::new(of, first_node, (kind, &nodes), point, |from, to| lattice.way(from, to), surfaces)
     }
 
-    /// Of a mesh, from the numbers of its elements within the body (ascending, all in one region), and the named surfaces
-    /// of its faces, by ascending nodes.
+    /// Of a mesh, from the nodes of its elements within the body (all in one region), where they are, and the named surfaces
+    /// of its faces, by ascending nodes. `piece` and `region` say which of the body it is in.
     pub fn of_mesh(
-        (id, body): (usize, usize),
-        &BodyMesh { first_node, ref materials, .. }: &BodyMesh,
-        mesh: &SolidMesh,
-        elements: &[u64],
+        (id, body, piece, region): (usize, usize, usize, usize),
+        &BodyMesh { first_node, ref materials, kind, .. }: &BodyMesh,
+        nodes: &[u64],
+        point: impl Fn(u64) -> [f64; 3],
         surfaces: &HashMap<Vec<u32>, Vec<usize>>,
     ) -> Self {
-        let nodes: Vec<u64> =
-            elements.iter().flat_map(|&e| mesh.elements.get(e as usize)).map(|&n| u64::from(n)).collect();
         let surfaces = |face: &[u64]| {
             let face: Vec<u32> = face.iter().map(|&n| n as u32).collect();
             surfaces.get(&key(&face)).cloned().unwrap_or_default()
         };
-        let point = |node: u64| mesh.points[node as usize];
         let way = |from, to| difference(point(to), point(from));
-        let first = elements[0] as usize;
-        let of = (id, body, mesh.piece(first), materials[mesh.region(first)]);
-        Self::new(of, first_node, (mesh.elements.kind(), &nodes), point, way, surfaces)
+        Self::new((id, body, piece, materials[region]), first_node, (kind, nodes), &point, way, surfaces)
     }
 
     /// Number of local unknowns.
@@ -129,55 +124,15 @@ impl Subdomain {
     pub fn local_node(&self, node: u64) -> Option<usize> {
         self.nodes.binary_search(&node).ok()
     }
-
-    /// As numbers, for sending; of subdomains of meshes only, whose shape follows from their points.
-    pub fn pack(&self, message: &mut Vec<u64>) {
-        let Self { id, body, piece, material, nodes, points, elements, facets, boundary, .. } = self;
-        message.extend(
-            [*id, *body, *piece, *material, nodes.len(), elements.len(), facets.len(), boundary.len()]
-                .map(|n| n as u64),
-        );
-        message.extend(nodes);
-        message.extend(points.as_flattened().iter().map(|x| x.to_bits()));
-        pack_pairs(elements.nodes(), message);
-        for facet in facets {
-            message.push(facet.surface as u64);
-            pack_pairs(&facet.nodes, message);
-        }
-        pack_pairs(boundary, message);
-    }
-
-    /// What [`Subdomain::pack`] made of elements of this kind; `None` at the end of the message.
-    pub fn unpack(kind: Kind, message: &mut impl Iterator<Item = u64>) -> Option<Self> {
-        let id = message.next()? as usize;
-        let mut next = || message.next().expect("a packed subdomain is whole");
-        let [body, piece, material, nodes, elements, facets, boundary] = [(); 7].map(|()| next() as usize);
-        let of_nodes: Vec<u64> = (0..nodes).map(|_| next()).collect();
-        let points: Vec<[f64; 3]> = (0..nodes).map(|_| [(); 3].map(|()| f64::from_bits(next()))).collect();
-        Some(Self {
-            id,
-            body,
-            piece,
-            material,
-            nodes: of_nodes,
-            shape: points.iter().map(|&point| difference(point, points[0])).collect(),
-            points,
-            elements: Elements::new(kind, unpack_pairs(elements * kind.nodes(), &mut next)),
-            facets: (0..facets)
-                .map(|_| Facet { surface: next() as usize, nodes: unpack_pairs(kind.faces()[0].len(), &mut next) })
-                .collect(),
-            boundary: unpack_pairs(boundary, &mut next),
-        })
-    }
 }
 
 /// Two numbers a word.
-fn pack_pairs(numbers: &[u32], message: &mut Vec<u64>) {
+pub(super) fn pack_pairs(numbers: &[u32], message: &mut Vec<u64>) {
     let pair = |pair: &[u32]| u64::from(pair.get(1).copied().unwrap_or_default()) << 32 | u64::from(pair[0]);
     message.extend(numbers.chunks(2).map(pair));
 }
 
-fn unpack_pairs(count: usize, next: &mut impl FnMut() -> u64) -> Vec<u32> {
+pub(super) fn unpack_pairs(count: usize, next: &mut impl FnMut() -> u64) -> Vec<u32> {
     let words = (0..count.div_ceil(2)).map(|_| next());
     words.flat_map(|pair| [pair as u32, (pair >> 32) as u32]).take(count).collect()
 }

@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::subdomain::Facet;
-use super::{Bodies, BodyMesh, Counts, Cut, Patch, Shape, Subdomain, Surface, number_bodies, tear};
+use super::{Bodies, BodyMesh, Counts, Cut, Patch, Shape, Subdomain, number_bodies, tear};
 use crate::comm::solo::Solo;
 use crate::comm::threads;
 use crate::element::tet4::Tet4;
@@ -10,12 +10,12 @@ use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by
 use crate::mesh::brick::indices;
 use crate::mesh::faces::key;
 use crate::mesh::surface::area_vector;
-use crate::mesh::{Brick, Elements, Face, SolidMesh};
+use crate::mesh::{Brick, Elements, SolidMesh};
 use crate::model::discrete::discretise;
 use crate::scene::Scene;
 use crate::sizing::sizes;
 
-/// Bricks and METIS, one body and two, few elements a part and many.
+/// Boxes and compact parts, one body and two, few elements a part and many.
 fn scenes() -> Vec<Scene> {
     let bar = |parts: usize| built_in("bar", &[&format!("decomposition.subdomains={parts}")]);
     vec![
@@ -187,17 +187,6 @@ fn subdomains_of_meshes_fill_their_bodies_and_have_their_surfaces() {
     }
 }
 
-#[test]
-fn subdomains_survive_sending() {
-    on_ranks(&two_meshes(5), 1, |setup| {
-        let mut message = Vec::new();
-        setup.subdomains().iter().for_each(|s| s.pack(&mut message));
-        let mut message = message.into_iter();
-        let unpacked: Vec<_> = std::iter::from_fn(|| Subdomain::unpack(Kind::Tet4, &mut message)).collect();
-        assert!(unpacked == setup.subdomains());
-    });
-}
-
 fn mesh_of(bricks: &[Brick]) -> SolidMesh {
     let (mut points, mut nodes) = (Vec::new(), Vec::new());
     for brick in bricks {
@@ -219,14 +208,15 @@ fn mesh_of(bricks: &[Brick]) -> SolidMesh {
 #[test]
 fn a_body_of_several_pieces_is_cut_piece_by_piece() {
     let brick = |x: f64, cells| Brick { origin: [x, 0.0, 0.0], size: [1.0; 3], cells };
-    let mesh = mesh_of(&[brick(0.0, [4, 4, 4]), brick(2.0, [1, 1, 1]), brick(4.0, [4, 4, 2])]);
+    let mut mesh = mesh_of(&[brick(0.0, [4, 4, 4]), brick(2.0, [1, 1, 1]), brick(4.0, [4, 4, 2])]);
     let elements = mesh.elements.len();
+    mesh.pieces = [vec![0; 384], vec![1; 6], vec![2; 192]].concat();
     let counts = Counts { nodes: mesh.points.len() as u64, cells: 0, elements: elements as u64 };
     let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(counts), vec![0])]);
     let meshes = BTreeMap::from([(0, mesh)]);
     for parts in [1, 3, 12] {
-        let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[], contact: &[] };
-        let subdomains = tear(&torn, Cut::Metis(parts), None, None, &Solo).subdomains;
+        let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[] };
+        let subdomains = tear(&torn, Cut::Parts(parts), None, None, &Solo).subdomains;
         assert!(subdomains.len() >= parts.max(3));
         assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
         subdomains.iter().for_each(assert_hangs_together);
@@ -240,8 +230,8 @@ fn thin_plates_and_bodies_of_few_elements_are_cut() {
     {
         let brick = Brick { origin: [0.0; 3], size, cells };
         let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick), vec![0])]);
-        let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
-        let subdomains = tear(&torn, Cut::Metis(parts), Some(1), None, &Solo).subdomains;
+        let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
+        let subdomains = tear(&torn, Cut::Parts(parts), Some(1), None, &Solo).subdomains;
         subdomains.iter().for_each(assert_hangs_together);
         let elements = brick.element_count() as usize;
         assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
@@ -265,8 +255,8 @@ fn regions_are_cut_one_by_one_by_their_size() {
     let cut = |parts: usize, ranks: usize| {
         let subdomains = threads::run(ranks, |comm| {
             let meshes = if comm.rank() == 0 { meshes.clone() } else { BTreeMap::new() };
-            let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[], contact: &[] };
-            tear(&torn, Cut::Metis(parts), None, None, comm).subdomains
+            let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[] };
+            tear(&torn, Cut::Parts(parts), None, None, comm).subdomains
         });
         subdomains.concat()
     };
@@ -289,21 +279,6 @@ fn regions_are_cut_one_by_one_by_their_size() {
 }
 
 #[test]
-fn contact_surfaces_stay_on_fewer_subdomains() {
-    let brick = Brick { origin: [0.0; 3], size: [3.0, 1.0, 1.0], cells: [24, 8, 8] };
-    let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick), vec![0])]);
-    let surfaces = [Surface { body: 0, patch: Patch::Face(Face::ZMax) }];
-    let touching = |contact: &[usize]| {
-        let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &surfaces, contact };
-        let subdomains = tear(&torn, Cut::Metis(24), None, None, &Solo).subdomains;
-        let largest = subdomains.iter().map(|s| s.elements.len()).max().unwrap();
-        assert!(largest * 24 <= brick.element_count() as usize * 11 / 10, "balance holds");
-        subdomains.iter().filter(|s| !s.facets.is_empty()).count()
-    };
-    assert!(touching(&[0]) < touching(&[]), "{} instead of {}", touching(&[0]), touching(&[]));
-}
-
-#[test]
 fn boxes_that_yield_are_spread_over_the_ranks() {
     let brick = |cells| Brick { origin: [0.0; 3], size: [1.0; 3], cells };
     let shapes = [[8, 4, 6], [4, 4, 4]].map(|cells| (Kind::Tet4, Shape::Brick(brick(cells)), vec![0]));
@@ -314,7 +289,7 @@ fn boxes_that_yield_are_spread_over_the_ranks() {
     let yielding = [upper, corner];
     let cut = |expected: Option<&[Vec<bool>]>, ranks: usize| {
         threads::run(ranks, |comm| {
-            let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
+            let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
             let own = tear(&torn, Cut::Bricks([2, 2, 2]), None, expected, comm).subdomains;
             own.iter().map(|s| (s.body, s.nodes.clone())).collect::<Vec<_>>()
         })

@@ -67,9 +67,7 @@ pub fn discretise_expecting(
     let named = Named::new(scene, &bodies);
 
     // Subdomains.
-    let touching: Vec<usize> =
-        scene.contact.values().flat_map(scene::Contact::surfaces).map(|s| named.index(s)).collect();
-    let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &named.surfaces, contact: &touching };
+    let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &named.surfaces };
     let cut = cut(&scene.decomposition.method, &bodies);
     can_be_cut(scene, &bodies, cut)?;
     let decomposition = decomposition::tear(&torn, cut, scene.decomposition.cluster, yielding, comm);
@@ -185,23 +183,23 @@ pub fn cut(wanted: &scene::Method, bodies: &[BodyMesh]) -> Cut {
     match *wanted {
         scene::Method::Bricks { cells } => Cut::Bricks(cells),
         scene::Method::Auto if bodies.iter().all(divides) => Cut::Bricks(boxes),
-        scene::Method::Metis { subdomains: Some(parts) } => Cut::Metis(parts),
+        scene::Method::Metis { subdomains: Some(parts) } => Cut::Parts(parts),
         scene::Method::Metis { subdomains: None } | scene::Method::Auto => {
             let regions = bodies.iter().map(|body| body.materials.len()).sum();
-            Cut::Metis(cost::subdomains(decomposition::tetrahedra(bodies), regions))
+            Cut::Parts(cost::subdomains(decomposition::tetrahedra(bodies), regions))
         }
     }
 }
 
-/// Refuses what METIS, whose integers have 32 bits, would lose count of.
+/// Refuses more faces than 31 bits can count.
 pub fn can_be_cut(scene: &Scene, bodies: &[BodyMesh], cut: Cut) -> Result<(), MeshError> {
     let faces = |body: &BodyMesh| body.counts().elements.saturating_mul(body.kind.faces().len() as u64);
     let too_many = |(_, body): &(&String, &BodyMesh)| faces(body) > i32::MAX as u64;
-    let found = scene.body.keys().zip(bodies).filter(|_| matches!(cut, Cut::Metis(_))).find(too_many);
+    let found = scene.body.keys().zip(bodies).filter(|_| matches!(cut, Cut::Parts(_))).find(too_many);
     let refusal = |(name, body): (&String, &BodyMesh)| {
         let (elements, faces) = (body.counts().elements, faces(body));
         MeshError::Bad(format!(
-            "body.{name}: its {elements} elements have {faces} faces, more than the {} that METIS can count; cut bricks into \
+            "body.{name}: its {elements} elements have {faces} faces, more than the {} that can be counted; cut bricks into \
              boxes (decomposition.cells), or take larger cells",
             i32::MAX
         ))

@@ -12,7 +12,7 @@
 //! a material may yield. Every rank has the coarse problem's factors, for all rows and for those of the active set:
 //! `COARSE` `n^1.4` numbers each for `n` clusters, as `bench-results/kernels.md` has it for 250 to 21,296.
 //!
-//! Constants are from runs of the benchmark on one rank, with each element, in boxes and by METIS: at level 2 the estimate is 0.75
+//! Constants are from runs of the benchmark on one rank, with each element, in boxes and in parts: at level 2 the estimate is 0.75
 //! to 1.3 times what runs took. The paper's boxes at levels 1 to 4 on two ranks take 0.94 to 1.19 of it.
 
 use crate::material::Law;

@@ -53,7 +53,7 @@ impl Msh {
         let elements = Elements::new(kind, nodes);
         let most = MOST_FACES / kind.faces().len();
         if elements.len() >= most {
-            let limit = format!("the {most} that a graph of METIS can have");
+            let limit = format!("the {most} whose faces can be counted");
             let announced = elements.len() as u64;
             return Err(Problem::TooMany { section: "Elements", items: "elements", announced, limit });
         }
@@ -166,5 +166,5 @@ fn refuse_others(volume: &str, kind: Kind, blocks: &[&Block]) -> Result<(), Prob
     })
 }
 
-/// Faces that the graph of METIS can number, in 31 bits.
+/// Faces that can be counted, in 31 bits.
 const MOST_FACES: usize = 1 << 31;

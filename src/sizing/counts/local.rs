@@ -40,7 +40,7 @@ fn scaled(kind: Kind, cells: [usize; 3], nodes: f64) -> Lengths {
 
 fn analysed(kind: Kind, cells: [usize; 3]) -> Lengths {
     let bodies = number_bodies([(kind, Shape::Brick(brick(cells)), vec![0])]);
-    let all = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[], contact: &[] };
+    let all = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
     let elements: Vec<u64> = (0..bodies[0].counts().elements).collect();
     let subdomain = Subdomain::of_brick(0, &all, 0, &elements);
     let symbolic = Symbolic::new(&subdomain);

@@ -2,7 +2,7 @@
 //!
 //! Exact are cells, elements and nodes of structured bodies, rows of supports, and what comes of cutting bricks into boxes:
 //! a box of `c` cells has `(d c_x + 1) (d c_y + 1) (d c_z + 1)` nodes with elements of degree `d`, a node with `m` copies
-//! `3 (m - 1)` gluing rows, so all of them are as many as the unknowns of all boxes are more than those of the bodies. What METIS
+//! `3 (m - 1)` gluing rows, so all of them are as many as the unknowns of all boxes are more than those of the bodies. What parts
 //! makes of a body is estimated as if it were cut into about as many boxes, as near to cubes as the body lets them;
 //! [`Sizes::estimated`] names what is. Rows of contact are counted by [`contacts`].
 
@@ -32,11 +32,11 @@ pub struct Counted<'a> {
     cut: Cut,
 }
 
-/// What METIS and the graph that it cuts take for each element, in bytes.
+/// What cutting into parts takes for each element, in bytes.
 const CUTTING: f64 = 250.0;
 
-/// What is estimated where METIS cuts.
-const BY_METIS: [&str; 6] = ["subdomains", "clusters", "contact_subdomains", "primal_dofs", "gluing_rows", "dual_dofs"];
+/// What is estimated of compact parts.
+const OF_PARTS: [&str; 6] = ["subdomains", "clusters", "contact_subdomains", "primal_dofs", "gluing_rows", "dual_dofs"];
 
 impl<'a> Counted<'a> {
     /// Counts the bodies of a scene; `None` if there are meshes from files.
@@ -68,7 +68,7 @@ impl<'a> Counted<'a> {
     /// Refuses what cannot be cut.
     ///
     /// # Errors
-    /// If there is more than METIS can count.
+    /// If there is more than can be counted.
     pub fn can_be_cut(&self) -> Result<(), MeshError> {
         can_be_cut(self.scene, &self.bodies, self.cut)
     }
@@ -93,8 +93,8 @@ impl<'a> Counted<'a> {
         }
         sizes.dirichlet_rows = self.supported();
         sizes.dual_dofs = sizes.gluing_rows.saturating_add(sizes.dirichlet_rows);
-        if let Cut::Metis(_) = self.cut {
-            sizes.estimated = BY_METIS.map(String::from).to_vec();
+        if let Cut::Parts(_) = self.cut {
+            sizes.estimated = OF_PARTS.map(String::from).to_vec();
         }
         sizes
     }
@@ -112,7 +112,7 @@ impl<'a> Counted<'a> {
         let conditions = self.conditions();
         // Of nodes with one copy for the most part, on both sides.
         slots += self.supported() as f64 + 3.0 * conditions;
-        let is_cut_at_once = |body: &&BodyMesh| matches!(self.cut, Cut::Metis(_)) || body.brick().is_none();
+        let is_cut_at_once = |body: &&BodyMesh| matches!(self.cut, Cut::Parts(_)) || body.brick().is_none();
         let elements = self.bodies.iter().filter(is_cut_at_once).map(|body| body.counts().elements as f64);
         Memory {
             subdomains_mb: megabytes(8.0 * (numbers + SLOT * slots)),
@@ -178,7 +178,7 @@ impl<'a> Counted<'a> {
                 };
                 bodies().map(of).collect()
             }
-            Cut::Metis(parts) => {
+            Cut::Parts(parts) => {
                 let cluster = cluster(parts) as f64;
                 let of = |((name, body), shape): ((&String, &BodyMesh), &Structured)| {
                     let share = tetrahedra(std::slice::from_ref(body)) as f64 / all as f64;

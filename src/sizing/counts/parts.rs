@@ -1,4 +1,4 @@
-//! The subdomains of one body: boxes, exactly, or pieces by METIS, about.
+//! The subdomains of one body: boxes, exactly, or compact parts, about.
 
 use super::local;
 use crate::decomposition::{BodyMesh, bricks};
@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::sizing::memory;
 use crate::sizing::memory::Lengths;
 
-/// Interface nodes of METIS' pieces to those of boxes.
+/// Interface nodes of compact parts to those of boxes.
 const RAGGED: f64 = 1.27;
 /// Slots of the gluing rows of a node beyond its first copy: two where there are two, five for two copies more.
 const SLOTS: f64 = 2.2;
@@ -53,7 +53,7 @@ impl Parts {
         Self { count, clusters, touching, unknowns, slots, numbers, factor: lengths.factor }
     }
 
-    /// As many pieces as METIS is asked for, in clusters of so many, of a body with so many nodes along its axes, and on its
+    /// As many parts as are asked for, in clusters of so many, of a body with so many nodes along its axes, and on its
     /// contact surfaces.
     pub fn pieces(scene: &Scene, body: &BodyMesh, extent: [f64; 3], [count, cluster]: [f64; 2], touching: f64) -> Self {
         let nodes = body.counts().nodes as f64;

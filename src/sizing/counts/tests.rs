@@ -167,7 +167,7 @@ fn memory_from_counts_is_that_of_the_built_problem() {
 }
 
 #[test]
-fn what_metis_cuts_is_estimated() {
+fn what_is_cut_into_parts_is_estimated() {
     for (level, element, parts) in
         [(1, "tet4", 12), (1, "tet4", 48), (2, "tet4", 48), (2, "hex8", 96), (1, "tet10", 24)]
     {
@@ -192,7 +192,7 @@ fn factors_of_large_boxes_follow_from_small_ones() {
     for (kind, cells) in [(Kind::Tet4, [16, 16, 16]), (Kind::Hex8, [30, 15, 15]), (Kind::Tet10, [8, 8, 8])] {
         let brick = Brick { origin: [0.0; 3], size: cells.map(|n| n as f64), cells };
         let bodies = number_bodies([(kind, Shape::Brick(brick), vec![0])]);
-        let all = Bodies { bodies: &bodies, meshes: &Default::default(), surfaces: &[], contact: &[] };
+        let all = Bodies { bodies: &bodies, meshes: &Default::default(), surfaces: &[] };
         let elements: Vec<u64> = (0..bodies[0].counts().elements).collect();
         let symbolic = Symbolic::new(&Subdomain::of_brick(0, &all, 0, &elements));
         let found = local::of_box(kind, cells);

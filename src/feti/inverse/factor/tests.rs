@@ -15,7 +15,7 @@ use crate::random::Random;
 use crate::scene::Scene;
 use crate::sparse::cholesky::Precision;
 
-/// Cubes, METIS parts of many and of few elements, a rod of a cell's section, a plate of one layer, needles for cells.
+/// Cubes, compact parts of many and of few elements, a rod of a cell's section, a plate of one layer, needles for cells.
 fn shapes() -> [Scene; 6] {
     let block = |cells: &str, size: &str| {
         built_in(

@@ -6,7 +6,7 @@ use crate::feti::inverse::kernel::MODES;
 use crate::fixture::{Setup, assert_close, block_diagonal, column, dense, on_ranks, same_on_any_ranks, two_bricks};
 use crate::scene::Scene;
 
-/// A pair, blocks of four in a body of two rows, and parts by METIS.
+/// A pair, blocks of four in a body of two rows, and compact parts.
 fn scenes() -> [Scene; 3] {
     let long = ["body.lower.brick.cells=[12, 4, 2]", "body.lower.brick.size=[12.0, 4.4, 2.0]"];
     let by_metis = ["decomposition.subdomains=12", "decomposition.cluster=3"];

@@ -1,0 +1,271 @@
+//! Compact parts of any bodies, cut by all ranks together.
+//!
+//! Rank 0 hands the meshes that it has read out in equal shares, bricks are generated in such shares. Parts start as pieces of a
+//! space-filling curve ([`curve`]), which are rods here and there and have tongues: these bend easily and cost iterations.
+//! They are made compact ([`compact`]), then their faces smooth ([`diffusion`]), then whole ([`pieces`]). Regions of bodies
+//! are cut one by one: a part never spans two bodies or two materials. Elements of a body cost the same, as they have one
+//! kind; between bodies they count as so many linear tetrahedra. In the end each rank gets the elements of its own
+//! subdomains.
+
+mod compact;
+mod curve;
+mod diffusion;
+mod groups;
+mod pieces;
+mod portion;
+mod wholes;
+
+use std::collections::{BTreeMap, HashMap};
+
+use self::compact::{compact, on_grid};
+use self::diffusion::Ground;
+use self::groups::groups;
+use self::pieces::Pieces;
+use self::portion::Portion;
+use self::wholes::{Wholes, spread};
+use super::shares::{by_cost, interleave};
+use super::subdomain::{pack_pairs, unpack_pairs};
+use super::{Bodies, Clusters, Patch, Shape, Subdomain};
+use crate::comm::{Comm, Shares, all_gather_u64, from_root};
+use crate::mesh::SolidMesh;
+use crate::mesh::connectivity::split_into_pieces;
+use crate::mesh::faces::{Neighbours, key};
+
+/// No part may have more than so many times the mean number of elements.
+const LARGEST: f64 = 1.25;
+
+/// Cuts all bodies into about `parts` parts (more where a part had to be split to be face-connected), in clusters of about
+/// `cluster` neighbouring ones. Returns the clusters, the shares and this rank's subdomains. Collective.
+pub(crate) fn own_subdomains(
+    bodies: &Bodies,
+    parts: usize,
+    cluster: usize,
+    comm: &dyn Comm,
+) -> (Clusters, Shares, Vec<Subdomain>) {
+    let dealt: Vec<Dealt> = (0..bodies.bodies.len()).map(|body| Dealt::new(bodies, body, comm)).collect();
+    let size = |(dealt, body): (&Dealt, &super::BodyMesh)| -> Vec<u64> {
+        dealt.sizes.iter().map(|size| size * body.kind.tetrahedra()).collect()
+    };
+    let sizes: Vec<u64> = dealt.iter().zip(bodies.bodies).flat_map(size).collect();
+    let mut wanted = spread(parts, &sizes).into_iter();
+    let mut cut = |dealt: Dealt| {
+        let parts = wanted.by_ref().take(dealt.sizes.len()).collect();
+        Cut::new(dealt, parts, cluster, comm)
+    };
+    let cuts: Vec<Cut> = dealt.into_iter().map(&mut cut).collect();
+
+    // Numbers and owners.
+    let order = interleave(&cuts.iter().map(|cut| cut.clusters.len()).collect::<Vec<_>>());
+    let members = |&(body, cluster): &(usize, usize)| cuts[body].clusters[cluster].as_slice();
+    let cost = |at: &(usize, usize)| -> u64 {
+        let elements = members(at).iter().map(|&part| cuts[at.0].sizes[part as usize]);
+        elements.sum::<u64>() * bodies.bodies[at.0].kind.tetrahedra()
+    };
+    let shares = by_cost(&order.iter().map(cost).collect::<Vec<_>>(), comm.size());
+    let mut places: Vec<Vec<(usize, usize)>> = cuts.iter().map(|cut| vec![(0, 0); cut.sizes.len()]).collect();
+    let mut id = 0;
+    for (cluster, at) in order.iter().enumerate() {
+        for &part in members(at) {
+            places[at.0][part as usize] = (id, shares.owner(cluster));
+            id += 1;
+        }
+    }
+    let counts: Vec<usize> = order.iter().map(|at| members(at).len()).collect();
+    let (clusters, shares) = Clusters::new(shares, &counts);
+    let mut own = Vec::new();
+    for (body, (cut, places)) in cuts.into_iter().zip(&places).enumerate() {
+        own.extend(cut.subdomains(bodies, body, places, comm));
+    }
+    own.sort_by_key(|subdomain| subdomain.id);
+    (clusters, shares, own)
+}
+
+/// Sums over all ranks, entry by entry; sums of integers know no order. Collective.
+fn sum(comm: &dyn Comm, mut mine: Vec<u64>) -> Vec<u64> {
+    if comm.size() > 1 {
+        let all = all_gather_u64(comm, &mine);
+        let length = mine.len().max(1);
+        mine.fill(0);
+        all.chunks_exact(length).for_each(|theirs| mine.iter_mut().zip(theirs).for_each(|(sum, x)| *sum += x));
+    }
+    mine
+}
+
+/// A body before it is cut.
+struct Dealt {
+    portion: Portion,
+    /// Elements of each whole.
+    sizes: Vec<u64>,
+    /// Piece of the body and region of each whole.
+    of_wholes: Vec<[usize; 2]>,
+}
+
+impl Dealt {
+    fn new(bodies: &Bodies, body: usize, comm: &dyn Comm) -> Self {
+        let mesh = bodies.meshes.get(&body);
+        let (wholes, mut table) = mesh.map_or((Vec::new(), Vec::new()), wholes);
+        if let Shape::Brick(_) = bodies.bodies[body].shape {
+            table = vec![[bodies.bodies[body].counts().elements, 0, 0]];
+        }
+        let table = from_root(comm, table.into_flattened());
+        let table = table.as_chunks::<3>().0;
+        Self {
+            portion: Portion::new(&bodies.bodies[body], mesh.map(|mesh| (mesh, wholes)), comm),
+            sizes: table.iter().map(|row| row[0]).collect(),
+            of_wholes: table.iter().map(|row| [row[1] as usize, row[2] as usize]).collect(),
+        }
+    }
+}
+
+/// The whole of each element of a mesh; and of each whole its number of elements, its piece of the body and its region.
+fn wholes(mesh: &SolidMesh) -> (Vec<u32>, Vec<[u64; 3]>) {
+    let elements = mesh.elements.len();
+    let mut of_elements: Vec<i32> = (0..elements).map(|element| mesh.region(element) as i32).collect();
+    if mesh.regions.is_empty() {
+        (0..).zip(&mut of_elements).for_each(|(element, whole)| *whole = mesh.piece(element) as i32);
+    } else {
+        let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
+        split_into_pieces(&mut of_elements, |element| neighbours.of(element));
+    }
+    let count = of_elements.iter().max().map_or(0, |&last| last as usize + 1);
+    let mut table = vec![[0; 3]; count];
+    for (element, &whole) in of_elements.iter().enumerate() {
+        let row = &mut table[whole as usize];
+        *row = [row[0] + 1, mesh.piece(element) as u64, mesh.region(element) as u64];
+    }
+    (of_elements.into_iter().map(|whole| whole as u32).collect(), table)
+}
+
+/// How a body is cut.
+struct Cut {
+    /// Every part is on one rank.
+    portion: Portion,
+    /// Elements of each part.
+    sizes: Vec<u64>,
+    /// Parts of each cluster, ascending.
+    clusters: Vec<Vec<u32>>,
+    of_wholes: Vec<[usize; 2]>,
+}
+
+impl Cut {
+    /// Into so many parts of each whole, in clusters of about so many. Where compact parts are too few or one is large, as on meshes
+    /// whose sizes differ much, only faces are made smooth, or nothing is done. Collective.
+    fn new(Dealt { portion, sizes, of_wholes }: Dealt, parts: Vec<u32>, cluster: usize, comm: &dyn Comm) -> Self {
+        let wholes = Wholes::new(sizes, parts);
+        let rank = |part: u32| part as usize * comm.size() / wholes.parts();
+        let mut portion = portion;
+        let start = |portion: &Portion| on_grid(comm, &portion.centres());
+        portion.part = curve::start(comm, &start(&portion), &portion.wholes, &wholes);
+        portion = portion.sent(comm, |at| rank(portion.part[at]));
+        let ground = Ground::new(comm, &portion);
+        let is_cut = wholes.parts() > wholes.len();
+        for (is_compact, is_smooth) in [(true, true), (false, true), (false, false)] {
+            if is_smooth && !is_cut {
+                continue;
+            }
+            let mut moved = portion.clone();
+            if is_compact {
+                compact(comm, &start(&portion), &mut moved.part, &wholes);
+            }
+            if is_smooth {
+                ground.smooth(&mut moved.part, &wholes);
+            }
+            let moved = moved.sent(comm, |at| rank(moved.part[at]));
+            let cut = Self::joined(moved, &wholes, cluster, comm);
+            let is_even = |(part, &size): (usize, &u64)| size as f64 <= LARGEST * wholes.mean(cut.1[part]);
+            let is_sound = cut.0.sizes.len() >= wholes.parts() && cut.0.sizes.iter().enumerate().all(is_even);
+            if is_sound || !is_smooth {
+                return Self { of_wholes, ..cut.0 };
+            }
+        }
+        unreachable!("the last cut is taken")
+    }
+
+    /// Makes pieces of parts that do not hang together parts of their own, or of others; also the whole of each part.
+    fn joined(mut portion: Portion, wholes: &Wholes, cluster: usize, comm: &dyn Comm) -> (Self, Vec<u32>) {
+        let pieces = Pieces::new(comm, &portion);
+        let to = pieces.join(wholes);
+        let count = to.iter().max().map_or(0, |&last| last as usize + 1);
+        let (mut sizes, mut of) = (vec![0; count], vec![0; count]);
+        for (piece, &to) in pieces.list.iter().zip(&to) {
+            sizes[to as usize] += piece.size;
+            of[to as usize] = piece.whole;
+        }
+        portion.part = pieces.own.iter().map(|&piece| to[piece as usize]).collect();
+        let mut faces = BTreeMap::new();
+        for (&(a, b), n) in &pieces.faces {
+            let (a, b) = (to[a as usize], to[b as usize]);
+            if a != b {
+                *faces.entry((a, b)).or_default() += n;
+            }
+        }
+        let faces: Vec<((u32, u32), u64)> = faces.into_iter().collect();
+        let group = match cluster {
+            1 => (0..count as u64).collect(),
+            _ if comm.rank() == 0 => groups(count, &faces, cluster).into_iter().map(u64::from).collect(),
+            _ => Vec::new(),
+        };
+        let group = from_root(comm, group);
+        let mut clusters = vec![Vec::new(); group.iter().max().map_or(0, |&last| last as usize + 1)];
+        (0..).zip(group).for_each(|(part, group)| clusters[group as usize].push(part));
+        (Self { portion, sizes, clusters, of_wholes: Vec::new() }, of)
+    }
+
+    /// Own subdomains, from the number and the owner of each part. Collective.
+    fn subdomains(self, bodies: &Bodies, body: usize, places: &[(usize, usize)], comm: &dyn Comm) -> Vec<Subdomain> {
+        let part = &self.portion.part;
+        let portion = self.portion.sent(comm, |at| places[part[at] as usize].1);
+        let surfaces = surfaces(bodies, body, comm);
+        let mut order: Vec<usize> = (0..portion.len()).collect();
+        order.sort_unstable_by_key(|&at| (portion.part[at], portion.numbers[at]));
+        let subdomain = |places_here: &[usize]| {
+            let id = places[portion.part[places_here[0]] as usize].0;
+            match bodies.bodies[body].shape {
+                Shape::Brick(_) => {
+                    let numbers: Vec<u64> = places_here.iter().map(|&at| portion.numbers[at].into()).collect();
+                    Subdomain::of_brick(id, bodies, body, &numbers)
+                }
+                Shape::Mesh(_) => {
+                    let [piece, region] = self.of_wholes[portion.wholes[places_here[0]] as usize];
+                    let nodes: Vec<u64> = places_here
+                        .iter()
+                        .flat_map(|&at| portion.elements.get(at))
+                        .map(|&node| portion.nodes[node as usize].into())
+                        .collect();
+                    let local = |node: u64| portion.nodes.binary_search(&(node as u32)).expect("the node is here");
+                    let point = |node: u64| portion.points[local(node)];
+                    Subdomain::of_mesh((id, body, piece, region), &bodies.bodies[body], &nodes, point, &surfaces)
+                }
+            }
+        };
+        order.chunk_by(|&a, &b| portion.part[a] == portion.part[b]).map(subdomain).collect()
+    }
+}
+
+/// Named surfaces of the boundary faces of a mesh, by ascending nodes, on every rank; none of a brick. Collective.
+fn surfaces(bodies: &Bodies, body: usize, comm: &dyn Comm) -> HashMap<Vec<u32>, Vec<usize>> {
+    let mut result: HashMap<_, Vec<usize>> = HashMap::new();
+    if let Shape::Brick(_) = bodies.bodies[body].shape {
+        return result;
+    }
+    let nodes = bodies.bodies[body].kind.faces()[0].len();
+    for (index, surface) in bodies.surfaces.iter().enumerate().filter(|(_, s)| s.body == body) {
+        let Patch::Named(name) = &surface.patch else { continue };
+        let mut message = Vec::new();
+        if let Some(mesh) = bodies.meshes.get(&body) {
+            let faces: Vec<u32> = mesh.surface(name).iter().flatten().copied().collect();
+            message.push(faces.len() as u64);
+            pack_pairs(&faces, &mut message);
+        }
+        let mut message = from_root(comm, message).into_iter();
+        let mut next = || message.next().expect("a packed surface is whole");
+        let count = next() as usize;
+        for face in unpack_pairs(count, &mut next).chunks_exact(nodes) {
+            result.entry(key(face)).or_default().push(index);
+        }
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests;
