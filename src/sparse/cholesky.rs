@@ -124,6 +124,16 @@ impl Analysis {
         Self(symbolic.expect("a factor fits in memory and its index type"))
     }
 
+    /// faer's own analysis.
+    pub(super) fn symbolic(&self) -> &SymbolicCholesky<u32> {
+        &self.0
+    }
+
+    /// The unknown at each place of the elimination.
+    pub(super) fn order(&self) -> Option<&[u32]> {
+        self.0.perm().map(|order| order.arrays().0)
+    }
+
     /// Numbers in the factor.
     pub fn factor_length(&self) -> usize {
         self.0.len_val()

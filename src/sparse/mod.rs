@@ -4,6 +4,7 @@
 //! solves on `supernodes` of its `number`s, [`submatrix`] does so for some of the unknowns.
 
 pub mod cholesky;
+pub mod fronts;
 mod number;
 pub mod ordering;
 pub mod pattern;

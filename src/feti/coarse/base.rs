@@ -7,6 +7,7 @@
 use super::bodies::BodyMotions;
 use super::factor::{Blocks, CoarseFactor};
 use super::{Coarse, Floating};
+use crate::comm::Comm;
 use crate::feti::inverse::kernel::MODES;
 
 /// The factor of `G_B G_B' + C C'`.
@@ -63,9 +64,9 @@ impl Base {
         self.factor.length()
     }
 
-    /// `a = (G_B G_B')^+ a`, for `a` orthogonal to the free motions. Local.
-    pub fn solve(&self, a: &mut [f64]) {
-        self.factor.solve(a);
+    /// `a = (G_B G_B')^+ a`, for `a` orthogonal to the free motions, equal on all ranks. Collective.
+    pub fn solve(&self, comm: &dyn Comm, a: &mut [f64]) {
+        self.factor.solve(comm, a);
     }
 }
 

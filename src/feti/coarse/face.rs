@@ -132,7 +132,7 @@ impl CoarseFace {
     pub fn reduce(&self, coarse: &Coarse, rows: &mut [f64]) {
         self.mask(rows);
         let (parts, _) = coarse.apply_each(&self.base, (rows, &[]), &[], 0);
-        coarse.add_transpose(-1.0, &self.motion(&parts), rows);
+        coarse.add_transpose(-1.0, &self.motion(coarse, &parts), rows);
         self.mask(rows);
     }
 
@@ -146,7 +146,7 @@ impl CoarseFace {
         width: usize,
     ) -> ([f64; 2], Vec<f64>) {
         let (parts, sums) = coarse.apply_each(&self.base, (x, r), partial, width);
-        let motion = self.motion(&parts);
+        let motion = self.motion(coarse, &parts);
         coarse.add_transpose(-1.0, &motion, x);
         self.mask(x);
         // With v = L'x: |x - G_A'v|^2 = x'x - 2 v'G_A x + v'G_A G_A'v, where G_B G_B'v = G_B x; and G_B r = 0.
@@ -163,16 +163,16 @@ impl CoarseFace {
         let mut masked = rows.to_vec();
         self.mask(&mut masked);
         let (parts, _) = coarse.apply_each(&self.base, (&masked, &[]), &[], 0);
-        self.motion(&parts)
+        self.motion(coarse, &parts)
     }
 
-    /// Changes `G rows` by `e` with the kept rows: `rows += L e`. Local.
+    /// Changes `G rows` by `e` with the kept rows: `rows += L e`. Collective.
     pub fn add_balance(&self, coarse: &Coarse, mut e: Vec<f64>, rows: &mut [f64]) {
         e.iter_mut().for_each(|e| *e = -*e);
         self.subtract_balance(coarse, e, rows);
     }
 
-    /// `rows -= L e`. Local.
+    /// `rows -= L e`. Collective.
     fn subtract_balance(&self, coarse: &Coarse, mut e: Vec<f64>, rows: &mut [f64]) {
         if let Some(held) = &self.held {
             let motions = self.base.free();
@@ -182,14 +182,14 @@ impl CoarseFace {
             self.mask(rows);
             held.pressed.iter().zip(&shares).for_each(|(forces, share)| subtract(*share, forces, &mut e));
         }
-        self.base.solve(&mut e);
+        self.base.solve(coarse.comm(), &mut e);
         coarse.add_transpose_in(&self.base, -1.0, &e, rows);
     }
 
-    /// `L'r` from `G_B r` and `G_X r`.
-    fn motion(&self, [inside, contacts, _]: &[Vec<f64>; 3]) -> Vec<f64> {
+    /// `L'r` from `G_B r` and `G_X r`. Collective.
+    fn motion(&self, coarse: &Coarse, [inside, contacts, _]: &[Vec<f64>; 3]) -> Vec<f64> {
         let mut motion = inside.clone();
-        self.base.solve(&mut motion);
+        self.base.solve(coarse.comm(), &mut motion);
         let Some(held) = &self.held else { return motion };
         let motions = self.base.free();
         let left: Vec<f64> =

@@ -1,4 +1,4 @@
-//! Sparse Cholesky factors of `G G'`, whole on every rank.
+//! Sparse Cholesky factors of `G G'`, whole on every rank; ranks share in the solves.
 //!
 //! Each set of rows has a factor of its own. Every block of some rows is a block of all rows too. So all sets are factorised in the
 //! pattern of all rows, which is ordered and analysed once.
@@ -7,8 +7,10 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+use crate::comm::Comm;
 use crate::feti::inverse::kernel::MODES;
 use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
+use crate::sparse::fronts::Fronts;
 use crate::sparse::ordering::nested_dissection;
 
 /// A 6x6 block of `G G'`, row by row.
@@ -84,7 +86,7 @@ impl CoarseAnalysis {
 pub struct CoarseFactor {
     symbolic: Rc<CoarseAnalysis>,
     factor: Factor,
-    workspace: RefCell<Workspace>,
+    fronts: RefCell<Fronts>,
     /// Of the entries of the matrix.
     largest: f64,
 }
@@ -94,27 +96,28 @@ impl CoarseFactor {
     ///
     /// # Errors
     /// If they are not positive definite, the cluster where that shows.
-    pub fn new(symbolic: &Rc<CoarseAnalysis>, blocks: &Blocks) -> Result<Self, usize> {
+    pub fn new(comm: &dyn Comm, symbolic: &Rc<CoarseAnalysis>, blocks: &Blocks) -> Result<Self, usize> {
         let CoarseAnalysis { begins, rows, cholesky, .. } = &**symbolic;
         let (lower, values) = (Lower { column_begin: begins, rows }, symbolic.values(blocks));
         let mut workspace = Workspace::new([cholesky]);
         let mut factor = Factor::new(cholesky, Precision::Double);
         workspace.factorise(cholesky, lower, &values, &mut factor).map_err(|breakdown| breakdown.unknown / MODES)?;
         let largest = values.iter().copied().fold(0.0, f64::max);
-        Ok(Self { symbolic: Rc::clone(symbolic), factor, workspace: RefCell::new(workspace), largest })
+        let fronts = RefCell::new(Fronts::new(cholesky, comm.size()));
+        Ok(Self { symbolic: Rc::clone(symbolic), factor, fronts, largest })
     }
 
     /// Round-off can hide a free motion: the factor then answers far beyond the size of the matrix. Inverse iteration from a
-    /// fixed vector without a pattern.
+    /// fixed vector without a pattern. Collective.
     ///
     /// # Errors
     /// The cluster that answers most.
-    pub fn check_rank(&self) -> Result<(), usize> {
+    pub fn check_rank(&self, comm: &dyn Comm) -> Result<(), usize> {
         let (n, largest) = (self.symbolic.begins.len() - 1, self.largest);
         let sound = |response: f64| response.abs() * largest < (n as f64).sqrt() / SINGULAR;
         // Multiples of an irrational number: no motion of a few clusters is orthogonal to them.
         let mut x: Vec<f64> = (1..=n).map(|k| (k as f64 * std::f64::consts::SQRT_2).fract() - 0.5).collect();
-        self.solve(&mut x);
+        self.solve(comm, &mut x);
         let worst = x.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         match worst {
             Some((at, response)) if !sound(*response) => Err(at / MODES),
@@ -127,9 +130,11 @@ impl CoarseFactor {
         self.symbolic.cholesky.factor_length()
     }
 
-    /// `a = (G G')^-1 a`, six numbers a cluster. Local.
-    pub fn solve(&self, a: &mut [f64]) {
-        self.workspace.borrow_mut().solve(&self.symbolic.cholesky, &self.factor, a);
+    /// `a = (G G')^-1 a`, six numbers a cluster, for equal `a` on all ranks. Collective.
+    pub fn solve(&self, comm: &dyn Comm, a: &mut [f64]) {
+        let all_gather = |mine: &[f64], counts: &[usize]| comm.all_gather(mine, counts);
+        let of = (&self.symbolic.cholesky, &self.factor);
+        self.fronts.borrow_mut().solve(of, comm.rank(), all_gather, a);
     }
 }
 

@@ -1,8 +1,8 @@
 //! The coarse problem: `G = R'B'` and `G G'`, six unknowns a cluster of subdomains, which in plain Total FETI is one.
 //!
 //! `G x` is local to each cluster; one all-gather brings it to every rank. Each rank holds the factors of the equalities
-//! ([`super::base`]) and, where a program asks for them, of all rows ([`super::projector`]) and solves redundantly: ranks agree to the
-//! last bit, and `G'a` needs no further exchange.
+//! ([`super::base`]) and, where a program asks for them, of all rows ([`super::projector`]). All ranks get the whole solution, to the
+//! same bits, and `G'a` needs no further exchange.
 
 use std::cell::OnceCell;
 use std::ops::Range;
@@ -110,10 +110,10 @@ impl<'a> Coarse<'a> {
         let clusters = self.clusters.total();
         let analysis = self.symbolic.get_or_init(|| Rc::new(CoarseAnalysis::new(&self.blocks(|_| true), clusters)));
         let fitting = if analysis.holds(blocks) { analysis } else { &Rc::new(CoarseAnalysis::new(blocks, clusters)) };
-        let factor = CoarseFactor::new(fitting, blocks);
+        let factor = CoarseFactor::new(self.comm, fitting, blocks);
         let sound = factor.and_then(|factor| {
-            let checked = factor.check_rank();
-            let held = |_| CoarseFactor::new(fitting, &unit())?.check_rank();
+            let checked = factor.check_rank(self.comm);
+            let held = |_| CoarseFactor::new(self.comm, fitting, &unit())?.check_rank(self.comm);
             if self.uneven { checked.or_else(held) } else { checked }.map(|()| factor)
         });
         sound.map_err(|cluster| self.floating(cluster))
@@ -139,12 +139,12 @@ impl<'a> Coarse<'a> {
         [self.products(Rows::Inequalities, |row| f64::from(kept(row))), unit]
     }
 
-    /// Solves with the factor of the equalities, in place: six numbers a cluster. Local.
+    /// Solves with the factor of the equalities, in place: six numbers a cluster, equal on all ranks. Collective.
     ///
     /// # Panics
     /// Before [`Coarse::factorise`].
     pub fn solve(&self, a: &mut [f64]) {
-        self.base().solve(a);
+        self.base().solve(self.comm, a);
     }
 
     /// Numbers in the factor of the equalities.
@@ -163,6 +163,10 @@ impl<'a> Coarse<'a> {
     /// Number of clusters.
     pub(super) fn clusters(&self) -> usize {
         self.clusters.total()
+    }
+
+    pub(super) fn comm(&self) -> &dyn Comm {
+        self.comm
     }
 
     fn products(&self, rows: Rows, weight: impl Fn(usize) -> f64) -> Blocks {

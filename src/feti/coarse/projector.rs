@@ -32,7 +32,7 @@ impl Projector<'_, '_> {
     /// `rows = P rows`; returns `(G G')^-1 G rows`. One all-gather.
     pub fn project(&self, rows: &mut [f64]) -> Vec<f64> {
         let mut a = self.coarse.apply(rows);
-        self.factor.solve(&mut a);
+        self.factor.solve(self.coarse.comm(), &mut a);
         self.coarse.add_transpose(-1.0, &a, rows);
         a
     }
@@ -43,7 +43,7 @@ impl Projector<'_, '_> {
         let ([mut e, contacts, _], sums) = self.coarse.apply_each(self.coarse.base(), (x, &[]), partial, width);
         e.iter_mut().zip(contacts).for_each(|(e, c)| *e += c);
         let mut a = e.clone();
-        self.factor.solve(&mut a);
+        self.factor.solve(self.coarse.comm(), &mut a);
         self.coarse.add_transpose(-1.0, &a, x);
         // |P x|^2 = x'x - e'a with e = G x. Not `max`: NaN must stay NaN.
         let square = sums[0] - dot(&e, &a);
