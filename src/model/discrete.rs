@@ -176,20 +176,32 @@ fn reading_mb(bodies: &[BodyMesh], comm: &dyn Comm) -> Option<f64> {
 
 /// How the scene wants its bodies cut.
 pub fn cut(wanted: &scene::Method, bodies: &[BodyMesh]) -> Cut {
-    // As many nodes as the paper's boxes have.
-    let degree = bodies.iter().map(|body| body.kind.degree()).max().unwrap_or(1);
-    let boxes = scene::PAPER_CELLS.map(|cells| cells / degree);
-    let divides = |body: &BodyMesh| body.brick().is_some_and(|b| (0..3).all(|a| b.cells[a].is_multiple_of(boxes[a])));
+    let best = || {
+        let regions = bodies.iter().map(|body| body.materials.len()).sum();
+        cost::subdomains(decomposition::tetrahedra(bodies), regions)
+    };
     match *wanted {
         scene::Method::Bricks { cells } => Cut::Bricks(cells),
-        scene::Method::Auto if bodies.iter().all(divides) => Cut::Bricks(boxes),
-        scene::Method::Metis { subdomains: Some(parts) } => Cut::Parts(parts),
-        scene::Method::Metis { subdomains: None } | scene::Method::Auto => {
-            let regions = bodies.iter().map(|body| body.materials.len()).sum();
-            Cut::Parts(cost::subdomains(decomposition::tetrahedra(bodies), regions))
-        }
+        scene::Method::Metis { subdomains } => Cut::Parts(subdomains.unwrap_or_else(best)),
+        scene::Method::Auto => boxes(bodies, best()).map_or_else(|| Cut::Parts(best()), Cut::Bricks),
     }
 }
+
+/// Cells of the cubes that divide all bodies into the number of boxes nearest to the `best`; none if that is far from it.
+fn boxes(bodies: &[BodyMesh], best: usize) -> Option<[usize; 3]> {
+    let cells: Vec<[usize; 3]> =
+        bodies.iter().map(|body| body.brick().map(|brick| brick.cells)).collect::<Option<_>>()?;
+    let fits = |edge: &usize| cells.iter().flatten().all(|cells| cells.is_multiple_of(*edge));
+    let count = |edge: usize| bodies.iter().map(|body| decomposition::bricks::count(body, [edge; 3])).sum::<usize>();
+    let apart = |edge: usize| (count(edge) as f64 / best as f64).ln().abs();
+    let edge = EDGES.rev().filter(fits).min_by(|&a, &b| apart(a).total_cmp(&apart(b)))?;
+    (apart(edge) <= f64::ln(FAR)).then_some([edge; 3])
+}
+
+/// Cells along the edge of a box.
+const EDGES: std::ops::RangeInclusive<usize> = 2..=12;
+/// So many times too many or too few boxes cost more than parts of any shape would.
+const FAR: f64 = 4.0;
 
 /// Refuses more faces than 31 bits can count.
 pub fn can_be_cut(scene: &Scene, bodies: &[BodyMesh], cut: Cut) -> Result<(), MeshError> {

@@ -24,7 +24,7 @@ pub struct Decomposition {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(tag = "method", rename_all = "lowercase")]
 pub enum Method {
-    /// Bricks with the paper's cells where they divide every body, else metis by the cost model.
+    /// By the cost model: cubes of cells where they divide every body, else metis.
     #[default]
     Auto,
     /// Equal boxes of cells; they must divide every brick.
