@@ -218,7 +218,7 @@ impl<'a> Newton<'a> {
             seconds: timer.total_seconds() - began,
         };
         self.steps.push((self.at().number, record));
-        match self.verdict(criterion, solved, timer) {
+        match self.verdict((criterion, step.is_exact), solved, timer) {
             Some(outcome) => self.end(outcome, timer),
             None => {
                 let Self { solver, problem, iterate, .. } = self;
@@ -236,13 +236,16 @@ impl<'a> Newton<'a> {
         if own.last().is_some_and(|(_, step)| step.local_residual > forcing::LOOSEST) {
             solver.sharpen();
         }
-        if problem.is_linear() && self.settings.accuracy.is_none() {
+        let goes_on = self.settings.accuracy.is_none();
+        if problem.is_linear() && goes_on {
             forcing.drop = solver.linear_drop();
         }
         let number = own.len() + 1;
         let at = (&iterate.u, &iterate.state);
         let last = refused.last().map_or(&iterate.lambda, |trial| &trial.lambda);
-        let step = match solver.solve(problem, at, last, *forcing, timer, &|applications| alive(number, applications)) {
+        let step = match solver
+            .solve(problem, at, last, (*forcing, goes_on), timer, &|applications| alive(number, applications))
+        {
             Ok(step) => step,
             Err(message) => return Trial::Ended(Outcome::Singular(message)),
         };
@@ -282,13 +285,13 @@ impl<'a> Newton<'a> {
         left
     }
 
-    /// Whether the iteration ends with the step just taken, whose quadratic program ended like this.
-    fn verdict(&mut self, criterion: f64, program: qp::Outcome, timer: &Timer) -> Option<Outcome> {
+    /// Whether the iteration ends with the step just taken, whose quadratic program ended like this, and whose model was exact or not.
+    fn verdict(&mut self, (criterion, was_exact): (f64, bool), program: qp::Outcome, timer: &Timer) -> Option<Outcome> {
         let Self { problem, solver, settings, iterate, .. } = self;
         if !(criterion.is_finite() && iterate.state.energy.is_finite()) {
             return Some(Outcome::NotFinite);
         }
-        let is_close = criterion < settings.tolerance || problem.is_linear();
+        let is_close = criterion < settings.tolerance || was_exact;
         if is_close && iterate.residuals.largest() <= settings.residual {
             return Some(Outcome::Converged);
         }

@@ -11,7 +11,7 @@ use super::problem::TornProblem;
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::qp::feasible::FeasibleSet;
-use crate::qp::pcpg::Pcpg;
+use crate::qp::pcpg::{Directions, Pcpg};
 use crate::qp::quadratic::{Quadratic, Space};
 use crate::qp::{Limits, Outcome, Statistics, active_set, power, smalse};
 use crate::scene::Qp;
@@ -39,6 +39,17 @@ pub struct DualSolution {
     pub statistics: Statistics,
     /// Whether it was solved to the tolerance of the scene.
     pub at_floor: bool,
+    /// What solving on goes on from; SMALSE-M does not.
+    pub rest: Option<Rest>,
+}
+
+/// A solution to be made more exact.
+pub struct Rest {
+    /// Multipliers with `G l = e`, zero where contacts are open.
+    start: Vec<f64>,
+    /// `d - F l`.
+    residual: Vec<f64>,
+    directions: Directions,
 }
 
 /// What later programs depend on, beside the last multipliers.
@@ -122,7 +133,13 @@ impl Programs {
         lambda
     }
 
-    /// Solves the program with these `resultants` `e` from multipliers `l` with `G l = e`, where its residual is `b`. [`Programs::face`] has the kept rows afterwards. Collective.
+    /// Multipliers `start` with `G l = e`, where the residual of the program is `residual`.
+    pub fn from(start: Vec<f64>, residual: Vec<f64>) -> Rest {
+        Rest { start, residual, directions: Directions::default() }
+    }
+
+    /// Solves the program with these `resultants` `e` from such multipliers, or solves on. [`Programs::face`] has the kept rows
+    /// afterwards. Collective.
     ///
     /// # Errors
     /// If these rows leave a rigid motion free.
@@ -131,7 +148,7 @@ impl Programs {
         problem: &TornProblem,
         mut dual: Dual,
         resultants: &[f64],
-        (lambda, b): (Vec<f64>, Vec<f64>),
+        from: Rest,
         forcing: Forcing,
     ) -> Result<DualSolution, Floating> {
         let limits = Limits {
@@ -142,11 +159,12 @@ impl Programs {
             products: self.settings.products,
         };
         if !problem.constraints.has_inequalities {
-            return Ok(self.equalities(problem, dual, resultants, (lambda, b), limits));
+            return Ok(self.equalities(problem, dual, resultants, from, limits));
         }
         let mut wasted = Statistics::default();
+        let (lambda, b) = (from.start.clone(), from.residual.clone());
         if self.settings.method == Qp::ActiveSet {
-            let found = self.active_set(problem, &mut dual, resultants, (lambda.clone(), b.clone()), limits);
+            let found = self.active_set(problem, &mut dual, resultants, from, limits);
             if found.outcome != Outcome::Cycled {
                 return Ok(found);
             }
@@ -173,17 +191,19 @@ impl Programs {
         problem: &TornProblem,
         dual: Dual,
         resultants: &[f64],
-        (mut lambda, mut residual): (Vec<f64>, Vec<f64>),
+        Rest { start: mut lambda, mut residual, directions }: Rest,
         limits: Limits,
     ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
         let rows = self.take_face(dual.coarse, lambda.len());
         let mut face = DualFace { dual, constraints: problem.constraints, resultants, rows };
-        let report = Pcpg::new(&space).solve(&mut face, &mut lambda, &mut residual, &limits);
+        let mut solver = Pcpg::with(&space, directions);
+        let report = solver.solve(&mut face, &mut lambda, &mut residual, &limits);
+        let rest = Rest { start: lambda.clone(), residual, directions: solver.into_directions() };
         self.face = Some(face.rows);
         let at_floor = self.note(&limits, report.first_norm);
         let (outcome, statistics) = (report.outcome, report.statistics);
-        DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor }
+        DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor, rest: Some(rest) }
     }
 
     fn active_set(
@@ -191,7 +211,7 @@ impl Programs {
         problem: &TornProblem,
         dual: &mut Dual,
         resultants: &[f64],
-        (x, residual): (Vec<f64>, Vec<f64>),
+        Rest { start: x, residual, directions }: Rest,
         limits: Limits,
     ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
@@ -201,18 +221,20 @@ impl Programs {
         let mut face = DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants, rows };
         if !face.complete(&mut kept) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
-            return DualSolution { lambda: Vec::new(), balanced: Vec::new(), outcome, statistics, at_floor: false };
+            let (lambda, balanced) = (Vec::new(), Vec::new());
+            return DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest: None };
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
-        let start = active_set::Guess { x, residual, kept, uneven: problem.constraints.uneven };
+        let start = active_set::Guess { x, residual, kept, uneven: problem.constraints.uneven, directions };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let at_floor = self.note(&limits, solution.first_norm);
-        let active_set::Solution { x: balanced, outcome, statistics, .. } = solution;
+        let active_set::Solution { x: balanced, residual, outcome, statistics, directions, .. } = solution;
+        let rest = Some(Rest { start: balanced.clone(), residual, directions });
         let mut lambda = balanced.clone();
         problem.constraints.laws().project(&mut lambda);
         let DualFace { dual, rows, .. } = face;
         self.face = Some(dual.timer.time("coarse set-up", || rows.settled(dual.coarse)));
-        DualSolution { lambda, balanced, outcome, statistics, at_floor }
+        DualSolution { lambda, balanced, outcome, statistics, at_floor, rest }
     }
 
     fn smalse(
@@ -263,7 +285,7 @@ impl Programs {
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         let kept = problem.constraints.laws().kept(&lambda, 0.0);
         self.face = Some(timer.time("coarse set-up", || CoarseFace::new(coarse, kept)));
-        Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor })
+        Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor, rest: None })
     }
 
     /// Takes the `first` residual of a program down as the reference of all tolerances, if it is that of the first program

@@ -15,6 +15,7 @@ use super::forcing::{Forcing, TIGHTEST};
 use super::problem::{State, TornProblem};
 use super::program::{DualSolution, ProgramSettings, ProgramState, Programs};
 use crate::assembly::flow::{self, Flow};
+use crate::assembly::internal;
 use crate::feti::Torn;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::motion;
@@ -42,6 +43,8 @@ pub struct Step {
     pub statistics: Statistics,
     /// Whether it was solved to the tolerance of the scene.
     pub at_floor: bool,
+    /// Whether the model of the step was exact: nothing yields, neither before nor behind it.
+    pub is_exact: bool,
     /// Residual of the subdomains' problems `K du = f - F(u) - B'lambda` that rounding leaves, relative to their forces.
     pub local_residual: f64,
     /// Applications of F, those around the quadratic program and of refinement included.
@@ -155,7 +158,8 @@ impl<'a> StepSolver<'a> {
         }
     }
 
-    /// Solves for the step at `u` from the `last` multipliers, those of the step before or of the last trial of this one; `alive` is told the applications of F so far. Collective.
+    /// Solves for the step at `u` from the `last` multipliers, those of the step before or of the last trial of this one; `alive` is told the applications of F so far.
+    /// Where nothing yields the program goes on, if it may, as far as that of a linear problem. Collective.
     ///
     /// # Errors
     /// A message, the same on every rank, if a tangent or the coarse problem is singular.
@@ -164,7 +168,7 @@ impl<'a> StepSolver<'a> {
         problem: &TornProblem,
         (u, state): (&Torn, &State),
         last: &[f64],
-        forcing: Forcing,
+        (forcing, goes_on): (Forcing, bool),
         timer: &Timer,
         alive: &dyn Fn(usize),
     ) -> Result<Step, String> {
@@ -188,32 +192,48 @@ impl<'a> StepSolver<'a> {
         let mut residual = vec![0.0; slack.len()];
         self.respond(&lambda, &mut forces.clone(), &mut residual, timer);
         residual.iter_mut().zip(&open).for_each(|(r, c)| *r -= c);
-        let dual = Dual {
-            operator: &mut self.operator,
-            coarse: &self.coarse,
-            preconditioner: self.preconditioner.as_mut(),
-            space: problem.space,
-            timer,
-            alive: &|applications| alive(applications - before),
-        };
-        let found = self.programs.solve(problem, dual, &resultants, (lambda, residual), forcing);
-        let mut found = found.map_err(|floating| floating.to_string())?;
+        let (mut from, mut forcing) = (Programs::from(lambda, residual), forcing);
+        let (mut statistics, mut is_exact) = (Statistics::default(), false);
+        let (found, recovered) = loop {
+            let dual = Dual {
+                operator: &mut self.operator,
+                coarse: &self.coarse,
+                preconditioner: self.preconditioner.as_mut(),
+                space: problem.space,
+                timer,
+                alive: &|applications| alive(applications - before),
+            };
+            let found = self.programs.solve(problem, dual, &resultants, from, forcing);
+            let mut found = found.map_err(|floating| floating.to_string())?;
+            statistics += found.statistics;
 
-        // du = K^+ (f_k - B'lambda) + R alpha.
-        let wanted = forcing.drop.max(EXACT);
-        let mut recovered = self.recover(problem, (&forces, &open), &mut found, wanted, timer);
-        for (du, lifted) in recovered.du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {
-            *du += lifted;
-        }
+            // du = K^+ (f_k - B'lambda) + R alpha.
+            let wanted = forcing.drop.max(EXACT);
+            let mut recovered = self.recover(problem, (&forces, &open), &mut found, wanted, timer);
+            for (du, lifted) in recovered.du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {
+                *du += lifted;
+            }
+            let was_exact = is_exact;
+            is_exact = found.outcome == Outcome::Converged && stays_elastic(problem, (u, state), &recovered.du);
+            match found.rest.take() {
+                // What was solved is no approximation, and worth solving on.
+                Some(rest) if goes_on && is_exact && !was_exact && !found.at_floor && !problem.is_linear() => {
+                    from = rest;
+                    forcing.drop = (self.linear_drop() / forcing.drop).min(1.0);
+                }
+                _ => break (found, recovered),
+            }
+        };
+        let mut recovered = recovered;
 
         // What the tolerance of the program left open is closed.
         if let (Some(preconditioner), Some(face)) = (&mut self.preconditioner, self.programs.face()) {
             preconditioner.close(problem.constraints, &slack, face.kept(), &mut recovered.du, timer);
         }
         let Recovered { du, local_residual, refined } = recovered;
-        let DualSolution { lambda, outcome, statistics, at_floor, .. } = found;
+        let DualSolution { lambda, outcome, at_floor, .. } = found;
         let applications = self.operator.applications() - before + refined;
-        Ok(Step { du, lambda, outcome, statistics, at_floor, local_residual, applications, factorisations })
+        Ok(Step { du, lambda, outcome, statistics, at_floor, is_exact, local_residual, applications, factorisations })
     }
 
     /// Assembles the tangents at `u` and factorises those that changed by more than `left`; the preconditioner follows. Returns
@@ -278,6 +298,20 @@ impl<'a> StepSolver<'a> {
         timer.time("dual operator", || self.operator.respond(x, torn, y));
         timer.count("dual operator", 0.0, self.operator.inverse.bytes_per_solve());
     }
+}
+
+/// Whether nothing yields at `u` nor at `u + du`. Collective.
+fn stays_elastic(problem: &TornProblem, (u, state): (&Torn, &State), du: &Torn) -> bool {
+    if problem.is_linear() || state.plastic > 0 {
+        return problem.is_linear();
+    }
+    let next = |own: usize| -> Vec<f64> { u[own].iter().zip(&du[own]).map(|(u, du)| u + du).collect() };
+    let yields = problem
+        .regions()
+        .iter()
+        .enumerate()
+        .any(|(own, region)| internal::yielding(region, &next(own)).next().is_some());
+    problem.space.maximum(f64::from(yields)) == 0.0
 }
 
 /// A displacement from multipliers.

@@ -14,7 +14,7 @@
 //! [`super::smalse`]. Unlike there x is not homogenised: bounds are zero and the equalities have a right-hand side,
 //! both the caller's affair, since the projector changes with the set.
 
-use super::pcpg::Pcpg;
+use super::pcpg::{Directions, Pcpg};
 use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics, axpy};
 
@@ -55,6 +55,8 @@ pub struct Solution {
     pub statistics: Statistics,
     /// Norm of the projected residual at the start, on the first set.
     pub first_norm: f64,
+    /// Directions on the last set.
+    pub directions: Directions,
 }
 
 /// Where to start, with a guess of the set.
@@ -67,12 +69,14 @@ pub struct Guess {
     pub kept: Vec<bool>,
     /// Whether rows are of unequal length, as where stiffness jumps.
     pub uneven: bool,
+    /// Directions on the first set.
+    pub directions: Directions,
 }
 
 /// Solves the problem. Give `limits` a reference at a warm start: the default is the first residual, which is too small
 /// there.
 pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Guess, limits: &Limits) -> Solution {
-    let Guess { x, residual, kept, uneven } = start;
+    let Guess { x, residual, kept, uneven, directions } = start;
     let n = x.len();
     let mut run = Run {
         space,
@@ -86,9 +90,11 @@ pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Gu
         statistics: Statistics::default(),
         first_norm: f64::NAN,
     };
-    let outcome = run.iterate(face, x, limits);
+    let mut solver = Pcpg::with(space, directions);
+    let outcome = run.iterate(face, &mut solver, x, limits);
+    let directions = solver.into_directions();
     let Run { x, residual, kept, statistics, first_norm, .. } = run;
-    Solution { x, residual, kept, outcome, statistics, first_norm }
+    Solution { x, residual, kept, outcome, statistics, first_norm, directions }
 }
 
 struct Run<'a> {
@@ -106,15 +112,13 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Alternates between solving and correcting the set. x starts on each set as near to `wish` as the set allows.
-    fn iterate(&mut self, face: &mut dyn Face, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
-        let mut solver = Pcpg::new(self.space);
+    fn iterate(&mut self, face: &mut dyn Face, solver: &mut Pcpg, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
         let mut target = None;
         // The sets so far, and whether each is solved to the tolerance before it is corrected.
         let (mut history, mut strict) = (Vec::new(), self.uneven);
         let mut smallest = f64::INFINITY;
         while history.len() < SETS {
             history.push(self.kept.clone());
-            solver.forget();
             self.move_to(face, &mut wish);
             self.statistics.sets += 1;
             if target.is_none() {
@@ -138,6 +142,7 @@ impl Run<'_> {
                     return Outcome::Converged;
                 }
             };
+            solver.forget();
             if !face.restrict(&mut self.kept) {
                 return Outcome::Cycled;
             }
@@ -213,7 +218,13 @@ mod tests {
         let bounded = torn.bounded.clone();
         assert!(torn.restrict(&mut kept));
         let residual = torn.f.times(&x).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();
-        solve(&Plain, torn, &bounded, Guess { x, residual, kept, uneven: false }, limits)
+        solve(
+            &Plain,
+            torn,
+            &bounded,
+            Guess { x, residual, kept, uneven: false, directions: Directions::default() },
+            limits,
+        )
     }
 
     #[test]

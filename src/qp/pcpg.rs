@@ -67,24 +67,39 @@ impl Inside {
     }
 }
 
+/// Directions that are A-orthogonal to each other, with their products.
+#[derive(Default)]
+pub struct Directions {
+    kept: Vec<Direction>,
+    oldest: usize,
+}
+
 /// The solver with the directions it keeps. As long as A and P stay the same it goes on from them: to solve loosely,
 /// look, and solve on costs nothing.
 pub struct Pcpg<'a> {
     space: &'a dyn Space,
-    kept: Vec<Direction>,
-    oldest: usize,
+    directions: Directions,
 }
 
 impl<'a> Pcpg<'a> {
     /// A solver that knows no direction yet.
     pub fn new(space: &'a dyn Space) -> Self {
-        Self { space, kept: Vec::new(), oldest: 0 }
+        Self::with(space, Directions::default())
     }
 
-    /// Drops the directions; due when A or P has changed.
+    /// A solver that knows directions of the same A in the range of the same P.
+    pub fn with(space: &'a dyn Space, directions: Directions) -> Self {
+        Self { space, directions }
+    }
+
+    /// What it knows.
+    pub fn into_directions(self) -> Directions {
+        self.directions
+    }
+
+    /// Drops the directions; due when A or the range of P has changed.
     pub fn forget(&mut self) {
-        self.kept.clear();
-        self.oldest = 0;
+        self.directions = Directions::default();
     }
 
     /// Solves from `x`, with `residual = b - A x` on entry and on return (at x = 0 it is b: no product needed). A
@@ -145,7 +160,7 @@ impl<'a> Pcpg<'a> {
             axpy(-step, &ap, residual);
             inside.advance(step, &projected, of_image);
             statistics.cg += 1;
-            self.keep(Direction { p, ap, curvature });
+            self.directions.keep(Direction { p, ap, curvature });
         }
     }
 
@@ -159,17 +174,19 @@ impl<'a> Pcpg<'a> {
             z.copy_from_slice(r);
         }
         function.project(&mut z);
-        let pairs: Vec<_> = self.kept.iter().map(|d| (&z[..], &d.ap[..])).collect();
+        let pairs: Vec<_> = self.directions.kept.iter().map(|d| (&z[..], &d.ap[..])).collect();
         if pairs.is_empty() {
             return z;
         }
         let coefficients = self.space.dots(&pairs);
-        for (d, c) in self.kept.iter().zip(coefficients) {
+        for (d, c) in self.directions.kept.iter().zip(coefficients) {
             axpy(-c / d.curvature, &d.p, &mut z);
         }
         z
     }
+}
 
+impl Directions {
     fn keep(&mut self, direction: Direction) {
         if self.kept.len() < KEPT {
             self.kept.push(direction);
