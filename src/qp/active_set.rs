@@ -7,8 +7,8 @@
 //! The equality problems are solved loosely. Each time the residual has dropped by a factor the set is checked, and PCPG
 //! goes on with its directions if the set stands. This can be too loose. Where stiffness jumps, the norm of the residual is
 //! that of the soft parts; the forces and gaps of stiff rows may still be wrong, and the sets may wander. So the equality
-//! problems are solved to the tolerance where stiffness jumps, and as soon as a set comes back or a correction is much
-//! larger than an earlier one.
+//! problems are solved to the tolerance where stiffness jumps, more exactly after a correction that is much larger than an earlier one,
+//! and more exactly for good each time that a set comes back, to the tolerance in the end.
 //!
 //! No proof of convergence goes with it: sets that come back end as [`Outcome::Cycled`], and the caller turns to
 //! [`super::smalse`]. Unlike there x is not homogenised: bounds are zero and the equalities have a right-hand side,
@@ -20,6 +20,10 @@ use super::{Limits, Outcome, Statistics, axpy};
 
 /// Factor by which the residual drops between two looks at the set.
 const LOOSE: f64 = 0.1;
+/// What it is multiplied by for a set after a large correction, and for good each time that a set comes back, ...
+const TIGHTER: f64 = 0.1;
+/// ... and the last before the tolerance.
+const LEAST: f64 = 1e-3;
 /// A correction that changes this many times more rows than the smallest so far: sets are corrected too early.
 const GROWTH: f64 = 2.0;
 /// Sets that are tried at most.
@@ -114,9 +118,9 @@ impl Run<'_> {
     /// Alternates between solving and correcting the set. x starts on each set as near to `wish` as the set allows.
     fn iterate(&mut self, face: &mut dyn Face, solver: &mut Pcpg, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
         let mut target = None;
-        // The sets so far, and whether each is solved to the tolerance before it is corrected.
-        let (mut history, mut strict) = (Vec::new(), self.uneven);
-        let mut smallest = f64::INFINITY;
+        // The sets so far, and how far the residual of each drops before it is corrected.
+        let (mut history, mut loose) = (Vec::new(), if self.uneven { 0.0 } else { LOOSE });
+        let (mut smallest, mut wanders) = (f64::INFINITY, false);
         while history.len() < SETS {
             history.push(self.kept.clone());
             self.move_to(face, &mut wish);
@@ -125,11 +129,12 @@ impl Run<'_> {
                 self.first_norm = self.projected_norm(face);
             }
             let target = *target.get_or_insert(limits.target(self.first_norm));
+            let wary = std::mem::replace(&mut wanders, false);
+            let relative = if wary { loose * TIGHTER } else { loose };
             let changes = loop {
                 let products = limits.products.saturating_sub(self.statistics.hessian);
-                let relative = if strict { 0.0 } else { LOOSE };
-                let loose = Limits { relative, reference: None, absolute: target, drop: 0.0, products };
-                let report = solver.solve(face, &mut self.x, &mut self.residual, &loose);
+                let limits = Limits { relative, reference: None, absolute: target, drop: 0.0, products };
+                let report = solver.solve(face, &mut self.x, &mut self.residual, &limits);
                 self.statistics += report.statistics;
                 if report.outcome != Outcome::Converged {
                     return report.outcome;
@@ -146,13 +151,13 @@ impl Run<'_> {
             if !face.restrict(&mut self.kept) {
                 return Outcome::Cycled;
             }
-            let (seen, wanders) = (self.seen(&history), changes > GROWTH * smallest);
+            wanders = changes > GROWTH * smallest;
             smallest = smallest.min(changes);
-            if seen && strict {
-                return Outcome::Cycled;
-            }
-            if (seen || wanders) && !strict {
-                strict = true;
+            if self.seen(&history) {
+                if loose == 0.0 {
+                    return Outcome::Cycled;
+                }
+                loose = if loose > LEAST { loose * TIGHTER } else { 0.0 };
                 history.clear();
             }
             wish.copy_from_slice(&self.x);
