@@ -2,7 +2,7 @@
 //!
 //! Rank 0 hands the meshes that it has read out in equal shares, bricks are generated in such shares. Parts start as pieces of a
 //! space-filling curve ([`curve`]), which are rods here and there and have tongues: these bend easily and cost iterations.
-//! They are made compact ([`compact`]), then their faces smooth ([`diffusion`]), then whole ([`pieces`]). Regions of bodies
+//! They are made compact ([`compact`]), then their faces smooth ([`diffusion`]) and flat ([`sides`]), then whole ([`pieces`]). Regions of bodies
 //! are cut one by one: a part never spans two bodies or two materials. Elements of a body cost the same, as they have one
 //! kind; between bodies they count as so many linear tetrahedra. In the end each rank gets the elements of its own
 //! subdomains.
@@ -13,6 +13,7 @@ mod diffusion;
 mod groups;
 mod pieces;
 mod portion;
+mod sides;
 mod wholes;
 
 use std::collections::{BTreeMap, HashMap};
@@ -22,6 +23,7 @@ use self::diffusion::Ground;
 use self::groups::groups;
 use self::pieces::Pieces;
 use self::portion::Portion;
+use self::sides::Sides;
 use self::wholes::{Wholes, spread};
 use super::shares::{by_cost, interleave};
 use super::subdomain::{pack_pairs, unpack_pairs};
@@ -157,7 +159,7 @@ impl Cut {
         let start = |portion: &Portion| on_grid(comm, &portion.centres());
         portion.part = curve::start(comm, &start(&portion), &portion.wholes, &wholes);
         portion = portion.sent(comm, |at| rank(portion.part[at]));
-        let ground = Ground::new(comm, &portion);
+        let (ground, sides) = (Ground::new(comm, &portion), Sides::new(comm, &portion));
         let is_cut = wholes.parts() > wholes.len();
         for (is_compact, is_smooth) in [(true, true), (false, true), (false, false)] {
             if is_smooth && !is_cut {
@@ -169,6 +171,7 @@ impl Cut {
             }
             if is_smooth {
                 ground.smooth(&mut moved.part, &wholes);
+                sides.flatten(&mut moved.part, &wholes);
             }
             let moved = moved.sent(comm, |at| rank(moved.part[at]));
             let cut = Self::joined(moved, &wholes, cluster, comm);
