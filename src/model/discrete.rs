@@ -211,7 +211,7 @@ pub fn can_be_cut(scene: &Scene, bodies: &[BodyMesh], cut: Cut) -> Result<(), Me
     let refusal = |(name, body): (&String, &BodyMesh)| {
         let (elements, faces) = (body.counts().elements, faces(body));
         MeshError::Bad(format!(
-            "body.{name}: its {elements} elements have {faces} faces, more than the {} that can be counted; cut bricks into \
+            "body.{name}: its {elements} elements have {faces} faces, more than the {} that METIS could count; cut bricks into \
              boxes (decomposition.cells), or take larger cells",
             i32::MAX
         ))

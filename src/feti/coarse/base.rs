@@ -79,7 +79,7 @@ fn tied(motions: &BodyMotions, free: &[Vec<f64>], mut blocks: Blocks) -> Blocks 
     // Nothing may hold a body.
     let own =
         |cluster: &usize| blocks.get(&(*cluster, *cluster)).map(|block| largest(block)).filter(|size| *size > 0.0);
-    let root = |cluster: &usize| own(cluster).unwrap_or(any).sqrt();
+    let root = |cluster: &usize| own(cluster).unwrap_or(if any > 0.0 { any } else { 1.0 }).sqrt();
     let roots: Vec<f64> = first.iter().map(root).collect();
     for motion in free {
         let of = |cluster: usize| &motion[MODES * cluster..][..MODES];

@@ -112,6 +112,12 @@ impl BodyMotions {
                 }
             }
         }
+        // Gluing cancels to rounding.
+        let largest = |values: &mut dyn Iterator<Item = &f64>| values.fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        let block = largest(&mut blocks.values().flatten());
+        let motion = largest(&mut self.clusters.iter().flat_map(|(_, matrix)| matrix.as_flattened()));
+        let rounding = ROUNDING * block * motion * motion;
+        gram.iter_mut().flatten().filter(|x| x.abs() <= rounding).for_each(|x| *x = 0.0);
         complement(&gram, n)
     }
 
@@ -145,6 +151,9 @@ impl BodyMotions {
         )
     }
 }
+
+/// Products of blocks and motions of a smaller share of the largest are rounding.
+const ROUNDING: f64 = 1e-13;
 
 fn piece(subdomain: &Subdomain) -> [usize; 2] {
     [subdomain.body, subdomain.piece]

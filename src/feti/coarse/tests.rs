@@ -74,3 +74,25 @@ fn what_nothing_holds_floats_on_every_rank() {
         }
     }
 }
+
+/// One body without any support, in a corner of three planes, as one subdomain and as eight.
+#[test]
+fn contact_alone_holds_a_body_that_no_support_holds() {
+    let planes = ["x", "y", "z"].map(|axis| {
+        let normal = ["x", "y", "z"].map(|other| if axis == other { 1.0 } else { 0.0 });
+        format!("[contact.{axis}]\nslave = \"cube.{axis}min\"\nrigid = {{ plane = {{ point = [0.0, 0.0, 0.0], normal = {normal:?} }} }}\n")
+    });
+    for cells in [4, 2] {
+        let text = format!(
+            "[material.steel]\nyoung = 1.0\npoisson = 0.3\n[body.cube]\nmaterial = \"steel\"\nelement = \"tet4\"\n\
+             brick = {{ origin = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0], cells = [4, 4, 4] }}\n\
+             [decomposition]\ncells = [{cells}, {cells}, {cells}]\n{}",
+            planes.concat()
+        );
+        let scene = Scene::from_text(&text, "corner", 1, &[]).expect("the scene is sound");
+        on_ranks(&scene, 2, |setup| {
+            let coarse = setup.coarse().expect("the planes hold it");
+            assert_eq!(coarse.free().len(), 6);
+        });
+    }
+}
