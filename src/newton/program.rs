@@ -113,10 +113,10 @@ impl Programs {
         self.face = Some(CoarseFace::new(coarse, kept));
     }
 
-    /// Multipliers with `G l = e` next to the `last` ones; those that use contacts least if the program starts from scratch.
+    /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch.
     /// `resultants` are `e = R'f_k`: forces and moments on all clusters, whole on every rank. Collective.
     pub fn start(&self, coarse: &Coarse, last: &[f64], resultants: &[f64]) -> Vec<f64> {
-        let all = |coarse| CoarseFace::loose(coarse, vec![true; last.len()]);
+        let all = |coarse| CoarseFace::new(coarse, vec![true; last.len()]);
         let mut lambda = vec![0.0; last.len()];
         let Some(face) = &self.face else {
             all(coarse).add_balance(coarse, resultants.to_vec(), &mut lambda);
@@ -183,7 +183,7 @@ impl Programs {
 
     /// The rows that the last program kept; all rows if there was none.
     fn take_face(&mut self, coarse: &Coarse, rows: usize) -> CoarseFace {
-        self.face.take().unwrap_or_else(|| CoarseFace::loose(coarse, vec![true; rows]))
+        self.face.take().unwrap_or_else(|| CoarseFace::new(coarse, vec![true; rows]))
     }
 
     fn equalities(
