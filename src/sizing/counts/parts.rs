@@ -8,7 +8,7 @@ use crate::sizing::memory;
 use crate::sizing::memory::Lengths;
 
 /// Interface nodes of compact parts to those of boxes.
-const RAGGED: f64 = 1.27;
+const RAGGED: f64 = 1.15;
 /// Slots of the gluing rows of a node beyond its first copy: two where there are two, five for two copies more.
 const SLOTS: f64 = 2.2;
 
