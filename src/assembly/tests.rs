@@ -17,7 +17,7 @@ fn shapes() -> Vec<Scene> {
         two_bricks_by_metis(7),
         two_bricks(&["body.upper.element=hex8"]),
         two_bricks(&["body.lower.element=tet10", "body.upper.element=tet10"]),
-        two_bricks(&["body.lower.element=hex8", "body.upper.element=hex8", "decomposition.subdomains=5"]),
+        two_bricks(&["body.lower.element=hex8", "body.upper.element=hex8", "decomposition.subdomains=3"]),
         built_in("bar", &["body.bar.brick.cells=[40, 1, 1]", "decomposition.cells=[40, 1, 1]"]),
     ]
 }
