@@ -50,6 +50,8 @@ pub struct Rest {
     /// `d - F l`.
     residual: Vec<f64>,
     directions: Directions,
+    /// Products that it took so far.
+    spent: usize,
 }
 
 /// What later programs depend on, beside the last multipliers.
@@ -135,7 +137,7 @@ impl Programs {
 
     /// Multipliers `start` with `G l = e`, where the residual of the program is `residual`.
     pub fn from(start: Vec<f64>, residual: Vec<f64>) -> Rest {
-        Rest { start, residual, directions: Directions::default() }
+        Rest { start, residual, directions: Directions::default(), spent: 0 }
     }
 
     /// Solves the program with these `resultants` `e` from such multipliers, or solves on. [`Programs::face`] has the kept rows
@@ -156,7 +158,7 @@ impl Programs {
             reference: self.reference,
             absolute: 0.0,
             drop: forcing.drop,
-            products: self.settings.products,
+            products: self.settings.products.saturating_sub(from.spent),
         };
         if !problem.constraints.has_inequalities {
             return Ok(self.equalities(problem, dual, resultants, from, limits));
@@ -191,7 +193,7 @@ impl Programs {
         problem: &TornProblem,
         dual: Dual,
         resultants: &[f64],
-        Rest { start: mut lambda, mut residual, directions }: Rest,
+        Rest { start: mut lambda, mut residual, directions, spent }: Rest,
         limits: Limits,
     ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
@@ -199,7 +201,8 @@ impl Programs {
         let mut face = DualFace { dual, constraints: problem.constraints, resultants, rows };
         let mut solver = Pcpg::with(&space, directions);
         let report = solver.solve(&mut face, &mut lambda, &mut residual, &limits);
-        let rest = Rest { start: lambda.clone(), residual, directions: solver.into_directions() };
+        let spent = spent + report.statistics.hessian;
+        let rest = Rest { start: lambda.clone(), residual, directions: solver.into_directions(), spent };
         self.face = Some(face.rows);
         let at_floor = self.note(&limits, report.first_norm);
         let (outcome, statistics) = (report.outcome, report.statistics);
@@ -211,7 +214,7 @@ impl Programs {
         problem: &TornProblem,
         dual: &mut Dual,
         resultants: &[f64],
-        Rest { start: x, residual, directions }: Rest,
+        Rest { start: x, residual, directions, spent }: Rest,
         limits: Limits,
     ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
@@ -229,7 +232,8 @@ impl Programs {
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let at_floor = self.note(&limits, solution.first_norm);
         let active_set::Solution { x: balanced, residual, outcome, statistics, directions, .. } = solution;
-        let rest = Some(Rest { start: balanced.clone(), residual, directions });
+        let spent = spent + statistics.hessian;
+        let rest = Some(Rest { start: balanced.clone(), residual, directions, spent });
         let mut lambda = balanced.clone();
         problem.constraints.laws().project(&mut lambda);
         let DualFace { dual, rows, .. } = face;
