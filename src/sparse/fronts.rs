@@ -8,7 +8,7 @@ use faer::sparse::linalg::cholesky::SymbolicCholeskyRaw;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 
 use super::cholesky::{Analysis, Factor};
-use super::supernodes;
+use super::supernodes::fronts as supernodes;
 
 /// The elimination tree of an analysis, shared out over ranks.
 pub struct Fronts {
@@ -114,7 +114,7 @@ impl Fronts {
         self.x.extend(order.iter().map(|&k| x[k as usize]));
 
         let Self { children, own, roots, common, updates, x: unknowns, panel } = self;
-        supernodes::eliminate_fronts(panels, values, (&own[mine], children), unknowns, updates);
+        supernodes::eliminate_all(panels, values, (&own[mine], children), unknowns, updates);
         if is_shared {
             let length = |&root: &u32| panels.supernode(root as usize).pattern().len();
             let counts: Vec<usize> = roots.iter().map(|roots| roots.iter().map(length).sum()).collect();
@@ -128,9 +128,9 @@ impl Fronts {
                 rest = others;
             }
         }
-        supernodes::eliminate_fronts(panels, values, (common, children), unknowns, updates);
-        supernodes::substitute_fronts(panels, values, common, unknowns, panel);
-        supernodes::substitute_fronts(panels, values, &own[mine], unknowns, panel);
+        supernodes::eliminate_all(panels, values, (common, children), unknowns, updates);
+        supernodes::substitute_all(panels, values, common, unknowns, panel);
+        supernodes::substitute_all(panels, values, &own[mine], unknowns, panel);
         if is_shared {
             let columns =
                 |s: &u32| panels.supernode_begin()[*s as usize] as usize..panels.supernode_end()[*s as usize] as usize;
