@@ -9,8 +9,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use fetiplast::comm::solo::Solo;
 use fetiplast::kernels::{
-    Analysis, Coarse, CoarseFace, Factor, Factors, Interconnection, Lower, Precision, Region, Schur, Subdomain,
-    Workspace, analyse, stiffness,
+    Analysis, Coarse, CoarseFace, Factors, Interconnection, Lower, Precision, Region, Schur, Subdomain, Workspace,
+    analyse, stiffness,
 };
 use fetiplast::model::{self, Discrete};
 use fetiplast::scene::Scene;
@@ -139,7 +139,7 @@ fn interior_first(
     let order: Vec<u32> = inside.chain(&boundary).copied().collect();
     let analysis = Analysis::ordered(lower, &order);
     let mut workspace = Workspace::new([&analysis]);
-    let mut factor = Factor::new(&analysis, precision);
+    let mut factor = analysis.factor(precision);
     // The last six pivots are round-off; a shift keeps them positive.
     let mut shifted = values.to_vec();
     for column in 0..lower.column_begin.len() - 1 {

@@ -14,7 +14,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::traits::RealField;
 use faer::{Mat, Par, Side, Spec};
 
-pub use super::number::WIDTH;
+pub use super::number::{Numbers, Precision, WIDTH};
 use super::pattern::Pattern;
 use super::supernodes;
 
@@ -43,55 +43,8 @@ impl<'a> Lower<'a> {
 /// Elimination order and sparsity of a factor.
 pub struct Analysis(SymbolicCholesky<u32>);
 
-/// What the numbers of a factor are stored in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precision {
-    /// 32 bits: right to about the condition number times 1e-7.
-    Single,
-    /// 64 bits.
-    Double,
-}
-
-/// The numbers of a factor.
-pub enum Factor {
-    /// In single precision.
-    Single(Vec<f32>),
-    /// In double precision.
-    Double(Vec<f64>),
-}
-
-impl Factor {
-    /// Space for a factor.
-    pub fn new(Analysis(symbolic): &Analysis, precision: Precision) -> Self {
-        match precision {
-            Precision::Single => Self::Single(vec![0.0; symbolic.len_val()]),
-            Precision::Double => Self::Double(vec![0.0; symbolic.len_val()]),
-        }
-    }
-
-    /// What its numbers are stored in.
-    pub fn precision(&self) -> Precision {
-        match self {
-            Self::Single(_) => Precision::Single,
-            Self::Double(_) => Precision::Double,
-        }
-    }
-
-    fn number(&self, at: usize) -> f64 {
-        match self {
-            Self::Single(numbers) => f64::from(numbers[at]),
-            Self::Double(numbers) => numbers[at],
-        }
-    }
-
-    /// Size of its numbers, in bytes. A solve reads them twice.
-    pub fn bytes(&self) -> usize {
-        match self {
-            Self::Single(numbers) => size_of_val(&numbers[..]),
-            Self::Double(numbers) => size_of_val(&numbers[..]),
-        }
-    }
-}
+/// The numbers of a factor. A solve reads them twice.
+pub type Factor = Numbers;
 
 /// The matrix is not positive definite: where the factorisation broke down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,6 +77,11 @@ impl Analysis {
         Self(symbolic.expect("a factor fits in memory and its index type"))
     }
 
+    /// Space for a factor.
+    pub fn factor(&self, precision: Precision) -> Factor {
+        Numbers::new(self.factor_length(), precision)
+    }
+
     /// faer's own analysis.
     pub(super) fn symbolic(&self) -> &SymbolicCholesky<u32> {
         &self.0
@@ -142,7 +100,7 @@ impl Analysis {
     /// The least pivot of a factor, relative to what `diagonal` tells of its unknown.
     pub fn least_pivot(&self, factor: &Factor, diagonal: impl Fn(usize) -> f64) -> f64 {
         let pivots = self.columns().map(|column| {
-            let pivot = factor.number(column.at);
+            let pivot = factor.get(column.at);
             pivot * pivot / diagonal(column.unknown)
         });
         pivots.fold(f64::INFINITY, f64::min)
@@ -156,7 +114,7 @@ impl Analysis {
             let Some(k) = place(column.unknown) else { continue };
             for (row, at) in column.rows.zip(column.at..) {
                 let i = place(row).expect("what is eliminated later is among the last");
-                lower[(i, k)] = factor.number(at);
+                lower[(i, k)] = factor.get(at);
             }
         }
         &lower * lower.transpose()

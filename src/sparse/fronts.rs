@@ -217,7 +217,7 @@ mod tests {
         let lower = Lower { column_begin: &begins, rows: &rows };
         let analysis = Analysis::ordered(lower, &nested_dissection(&graph, 1));
         let mut workspace = Workspace::new([&analysis]);
-        let mut factor = Factor::new(&analysis, Precision::Double);
+        let mut factor = analysis.factor(Precision::Double);
         workspace.factorise(&analysis, lower, &values, &mut factor).expect("it is definite");
         assert!(analysis.factor_length() > SMALL);
         let right: Vec<f64> = (0..n * n * n).map(|k| (k as f64).sin()).collect();

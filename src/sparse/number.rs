@@ -4,6 +4,74 @@ use std::ops::{Add, Div, Neg, Sub};
 
 use pulp::Simd;
 
+/// What numbers are stored in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 32 bits. A factor is right to about the condition number times 1e-7.
+    Single,
+    /// 64 bits.
+    Double,
+}
+
+/// Numbers of a matrix or a factor.
+pub enum Numbers {
+    /// In single precision.
+    Single(Vec<f32>),
+    /// In double precision.
+    Double(Vec<f64>),
+}
+
+impl Numbers {
+    /// So many zeros.
+    pub fn new(count: usize, precision: Precision) -> Self {
+        match precision {
+            Precision::Single => Self::Single(vec![0.0; count]),
+            Precision::Double => Self::Double(vec![0.0; count]),
+        }
+    }
+
+    /// From now on they are these, in this precision.
+    pub fn take(&mut self, numbers: impl Iterator<Item = f64>, precision: Precision) {
+        if self.precision() != precision {
+            *self = Self::new(0, precision);
+        }
+        match self {
+            Self::Single(all) => {
+                all.clear();
+                all.extend(numbers.map(|x| x as f32));
+            }
+            Self::Double(all) => {
+                all.clear();
+                all.extend(numbers);
+            }
+        }
+    }
+
+    /// What they are stored in.
+    pub fn precision(&self) -> Precision {
+        match self {
+            Self::Single(_) => Precision::Single,
+            Self::Double(_) => Precision::Double,
+        }
+    }
+
+    /// One of them.
+    pub fn get(&self, at: usize) -> f64 {
+        match self {
+            Self::Single(numbers) => f64::from(numbers[at]),
+            Self::Double(numbers) => numbers[at],
+        }
+    }
+
+    /// Their size in bytes.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Single(numbers) => size_of_val(&numbers[..]),
+            Self::Double(numbers) => size_of_val(&numbers[..]),
+        }
+    }
+}
+
 /// Right-hand sides that are solved together, and partial sums of an inner product.
 pub const WIDTH: usize = 8;
 

@@ -1,7 +1,27 @@
 //! Blocks of a subdomain's stiffness matrix: where their entries stand among the values of the whole.
 
 use super::cholesky::{Analysis, Factor, Lower, Precision};
+use super::number::Numbers;
 use super::pattern::Pattern;
+use crate::simd::vectorised;
+
+/// Calls a kernel on the block's values, whatever their precision.
+macro_rules! dispatch {
+    ($kernel:ident($block:expr, $values:expr, $x:expr, $y:expr)) => {
+        match $values {
+            Numbers::Single(values) => vectorised(
+                ($block, values, $x, $y),
+                #[inline(always)]
+                |(a, values, x, y)| $kernel(a, values, x, y),
+            ),
+            Numbers::Double(values) => vectorised(
+                ($block, values, $x, $y),
+                #[inline(always)]
+                |(a, values, x, y)| $kernel(a, values, x, y),
+            ),
+        }
+    };
+}
 
 /// Entries of one block, line by line.
 #[derive(Default)]
@@ -28,16 +48,76 @@ impl Entries {
         entries
     }
 
-    /// Overwrites `values` by those of the block, given those of the whole matrix.
-    pub fn take(&self, stiffness: &[f64], values: &mut Vec<f64>) {
-        values.clear();
-        values.extend(self.positions.iter().map(|&at| stiffness[at as usize]));
+    /// The values of the block, given those of the whole matrix.
+    pub fn values(&self, stiffness: &[f64]) -> impl Iterator<Item = f64> {
+        self.positions.iter().map(|&at| stiffness[at as usize])
+    }
+
+    /// `y += A x`, `W` vectors side by side, the block having these values.
+    pub fn add_product<const W: usize>(&self, values: &Numbers, x: &[[f64; W]], y: &mut [[f64; W]]) {
+        dispatch!(add_product(self, values, x, y));
+    }
+
+    /// `y -= A' x`.
+    pub fn subtract_transpose<const W: usize>(&self, values: &Numbers, x: &[[f64; W]], y: &mut [[f64; W]]) {
+        dispatch!(subtract_transpose(self, values, x, y));
+    }
+
+    /// `y += A x` from the lower triangle of a symmetric block by columns, diagonal first.
+    pub fn add_symmetric<const W: usize>(&self, values: &Numbers, x: &[[f64; W]], y: &mut [[f64; W]]) {
+        dispatch!(add_symmetric(self, values, x, y));
     }
 
     /// Other index and value of each entry of a line.
-    pub fn line<'a>(&'a self, line: usize, values: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
+    #[inline(always)]
+    fn line<'a, T: Copy + Into<f64>>(
+        &'a self,
+        line: usize,
+        values: &'a [T],
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
         let range = self.begin[line] as usize..self.begin[line + 1] as usize;
-        self.others[range.clone()].iter().map(|&other| other as usize).zip(values[range].iter().copied())
+        self.others[range.clone()].iter().map(|&other| other as usize).zip(values[range].iter().map(|&x| x.into()))
+    }
+}
+
+#[inline(always)]
+fn add_product<const W: usize>(a: &Entries, values: &[impl Copy + Into<f64>], x: &[[f64; W]], y: &mut [[f64; W]]) {
+    for (line, y) in y.iter_mut().enumerate() {
+        for (other, value) in a.line(line, values) {
+            let x = &x[other];
+            (0..W).for_each(|l| y[l] += value * x[l]);
+        }
+    }
+}
+
+#[inline(always)]
+fn subtract_transpose<const W: usize>(
+    a: &Entries,
+    values: &[impl Copy + Into<f64>],
+    x: &[[f64; W]],
+    y: &mut [[f64; W]],
+) {
+    for (line, x) in x.iter().enumerate() {
+        for (other, value) in a.line(line, values) {
+            let y = &mut y[other];
+            (0..W).for_each(|l| y[l] -= value * x[l]);
+        }
+    }
+}
+
+#[inline(always)]
+fn add_symmetric<const W: usize>(a: &Entries, values: &[impl Copy + Into<f64>], x: &[[f64; W]], y: &mut [[f64; W]]) {
+    for column in 0..x.len() {
+        let (of_column, mut sum) = (x[column], [0.0; W]);
+        for (k, (row, value)) in a.line(column, values).enumerate() {
+            let of_row = x[row];
+            (0..W).for_each(|l| sum[l] += value * of_row[l]);
+            if k > 0 {
+                let y = &mut y[row];
+                (0..W).for_each(|l| y[l] += value * of_column[l]);
+            }
+        }
+        (0..W).for_each(|l| y[column][l] += sum[l]);
     }
 }
 
@@ -76,7 +156,7 @@ impl Submatrix {
 
     /// Space for its factor.
     pub fn factor(&self, precision: Precision) -> Factor {
-        Factor::new(&self.cholesky, precision)
+        self.cholesky.factor(precision)
     }
 
     /// The least pivot of its factor, relative to the diagonal entry that it began as, given the block's values: how much

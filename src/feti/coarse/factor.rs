@@ -100,7 +100,7 @@ impl CoarseFactor {
         let CoarseAnalysis { begins, rows, cholesky, .. } = &**symbolic;
         let (lower, values) = (Lower { column_begin: begins, rows }, symbolic.values(blocks));
         let mut workspace = Workspace::new([cholesky]);
-        let mut factor = Factor::new(cholesky, Precision::Double);
+        let mut factor = cholesky.factor(Precision::Double);
         workspace.factorise(cholesky, lower, &values, &mut factor).map_err(|breakdown| breakdown.unknown / MODES)?;
         let largest = values.iter().copied().fold(0.0, f64::max);
         let fronts = RefCell::new(Fronts::new(cholesky, comm.size()));

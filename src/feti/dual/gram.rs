@@ -133,7 +133,7 @@ impl Gram {
             sites: coefficients.iter().map(|c| c.site).collect(),
             products,
             workspace: Workspace::new([&analysis]),
-            factor: Factor::new(&analysis, Precision::Double),
+            factor: analysis.factor(Precision::Double),
             analysis,
             definite: false,
             kept: vec![false; rows.len()],

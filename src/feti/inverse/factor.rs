@@ -104,7 +104,7 @@ impl Factors {
     /// Space for the factors; nothing is factorised yet. With single `precision`, a factor that fails a probe is made again in double.
     pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
-        let factors = Stock::new(symbolic.iter().map(|s| Factor::new(&s.cholesky, precision)));
+        let factors = Stock::new(symbolic.iter().map(|s| s.cholesky.factor(precision)));
         let (stamps, pinned) = (vec![0; symbolic.len()], vec![Vec::new(); symbolic.len()]);
         Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0, pinned }
     }
@@ -156,16 +156,16 @@ impl Factors {
         }
         self.made += 1;
         self.stamps[own] = self.made;
-        let factor = self.factors.renew(own, common, || Factor::new(cholesky, self.precision));
+        let factor = self.factors.renew(own, common, || cholesky.factor(self.precision));
         if factor.precision() != self.precision {
-            *factor = Factor::new(cholesky, self.precision);
+            *factor = cholesky.factor(self.precision);
         }
         let outcome = self.workspace.factorise(cholesky, Lower::from(pattern), &self.shifted, factor);
         if factor.precision() == Precision::Double {
             return outcome.map_err(|breakdown| refuse(breakdown.place));
         }
         if outcome.is_err() || !passes_probe(pattern, &self.shifted, |x| self.workspace.solve(cholesky, factor, x)) {
-            *factor = Factor::new(cholesky, Precision::Double);
+            *factor = cholesky.factor(Precision::Double);
             let outcome = self.workspace.factorise(cholesky, Lower::from(pattern), &self.shifted, factor);
             return outcome.map_err(|breakdown| refuse(breakdown.place));
         }

@@ -9,8 +9,7 @@ use std::rc::Rc;
 use super::factor::{NotDefinite, Symbolic};
 use super::stock::{Batch, Stock};
 use crate::feti::Torn;
-use crate::simd::vectorised;
-use crate::sparse::cholesky::{Factor, Precision, WIDTH, Workspace};
+use crate::sparse::cholesky::{Factor, Numbers, Precision, WIDTH, Workspace};
 use crate::sparse::submatrix::{Entries, Submatrix};
 
 /// Which unknowns are on the boundary, where their entries stand, and the analysis of the interior block.
@@ -59,14 +58,16 @@ impl Split {
     fn values(&self, precision: Option<Precision>) -> Values {
         let factor = |interior: &Submatrix| precision.map(|precision| interior.factor(precision));
         let interior = self.interior.as_ref().and_then(factor);
-        Values { boundary_block: Vec::new(), coupling: Vec::new(), interior, weak: false }
+        let empty = || Numbers::new(0, Precision::Double);
+        Values { boundary_block: empty(), coupling: empty(), interior, weak: false }
     }
 }
 
 /// The numbers of one subdomain.
 struct Values {
-    boundary_block: Vec<f64>,
-    coupling: Vec<f64>,
+    /// The blocks, in the precision of the factor.
+    boundary_block: Numbers,
+    coupling: Numbers,
     interior: Option<Factor>,
     /// Whether the interior gives way far more easily somewhere than its unknowns do one by one.
     weak: bool,
@@ -129,13 +130,19 @@ impl Schur {
     pub fn update(&mut self, own: usize, subdomain: usize, stiffness: &[f64], common: bool) -> Result<(), NotDefinite> {
         let split = &*self.splits[own];
         let values = self.values.renew(own, common && self.together[own], || split.values(self.precision));
-        split.boundary_block.take(stiffness, &mut values.boundary_block);
-        split.coupling.take(stiffness, &mut values.coupling);
-        let (Some(interior), Some(factor)) = (&split.interior, &mut values.interior) else { return Ok(()) };
+        let take = |precision, values: &mut Values| {
+            values.boundary_block.take(split.boundary_block.values(stiffness), precision);
+            values.coupling.take(split.coupling.values(stiffness), precision);
+        };
+        let (Some(interior), Some(factor)) = (&split.interior, &mut values.interior) else {
+            take(Precision::Double, values);
+            return Ok(());
+        };
         if let Some(precision) = self.precision.filter(|&precision| factor.precision() != precision) {
             *factor = interior.factor(precision);
         }
-        interior.block.take(stiffness, &mut self.block);
+        self.block.clear();
+        self.block.extend(interior.block.values(stiffness));
         let mut factorise =
             |factor: &mut Factor| self.workspace.factorise(&interior.cholesky, interior.lower(), &self.block, factor);
         let mut outcome = factorise(factor);
@@ -145,6 +152,7 @@ impl Schur {
             *factor = interior.factor(Precision::Double);
             outcome = factorise(factor);
         }
+        take(factor.precision(), values);
         outcome.map_err(|breakdown| NotDefinite { subdomain, pivot: breakdown.place, dofs: interior.unknowns.len() })
     }
 
@@ -160,11 +168,9 @@ impl Schur {
 
     /// Bytes of matrices that one [`Schur::apply`] reads: the factor twice, so the coupling, the boundary block once.
     pub fn bytes_per_apply(&self) -> f64 {
-        let number = (size_of::<f64>() + size_of::<u32>()) as f64;
         self.values.sum(|values| {
-            let factor = values.interior.as_ref().map_or(0, Factor::bytes);
-            let sparse = values.boundary_block.len() + 2 * values.coupling.len();
-            2.0 * factor as f64 + number * sparse as f64
+            let Values { boundary_block, coupling, interior, .. } = values;
+            (2 * interior.as_ref().map_or(0, Factor::bytes) + boundary_block.bytes() + 2 * coupling.bytes()) as f64
         })
     }
 
@@ -246,11 +252,7 @@ impl<'a, const W: usize> Job<'a, W> {
     fn respond(&self, workspace: &mut Workspace, t: &[[f64; W]]) -> Vec<[f64; W]> {
         let (Some(interior), Some(factor)) = (&self.split.interior, &self.values.interior) else { return Vec::new() };
         let mut inside = vec![[0.0; W]; interior.unknowns.len()];
-        vectorised(
-            &mut inside,
-            #[inline(always)]
-            |inside| scatter(&self.split.coupling, &self.values.coupling, t, inside),
-        );
+        self.split.coupling.subtract_transpose(&self.values.coupling, t, &mut inside);
         let solve = if W == WIDTH { Workspace::solve_wide } else { Workspace::solve };
         solve(workspace, &interior.cholesky, factor, inside.as_flattened_mut());
         inside
@@ -258,58 +260,13 @@ impl<'a, const W: usize> Job<'a, W> {
 
     /// `K_bb t + K_bi inside`.
     fn forces(&self, t: &[[f64; W]], inside: &[[f64; W]]) -> Vec<[f64; W]> {
-        let Split { boundary_block, coupling, .. } = self.split;
+        let Values { boundary_block, coupling, .. } = self.values;
         let mut forces = vec![[0.0; W]; t.len()];
-        vectorised(
-            &mut forces,
-            #[inline(always)]
-            |forces| {
-                multiply_symmetric(boundary_block, &self.values.boundary_block, t, forces);
-                if !inside.is_empty() {
-                    gather(coupling, &self.values.coupling, inside, forces);
-                }
-            },
-        );
+        self.split.boundary_block.add_symmetric(boundary_block, t, &mut forces);
+        if !inside.is_empty() {
+            self.split.coupling.add_product(coupling, inside, &mut forces);
+        }
         forces
-    }
-}
-
-/// `y -= A' x`.
-#[inline(always)]
-fn scatter<const W: usize>(a: &Entries, values: &[f64], x: &[[f64; W]], y: &mut [[f64; W]]) {
-    for (line, x) in x.iter().enumerate() {
-        for (other, value) in a.line(line, values) {
-            let y = &mut y[other];
-            (0..W).for_each(|l| y[l] -= value * x[l]);
-        }
-    }
-}
-
-/// `y += A x`.
-#[inline(always)]
-fn gather<const W: usize>(a: &Entries, values: &[f64], x: &[[f64; W]], y: &mut [[f64; W]]) {
-    for (line, y) in y.iter_mut().enumerate() {
-        for (other, value) in a.line(line, values) {
-            let x = &x[other];
-            (0..W).for_each(|l| y[l] += value * x[l]);
-        }
-    }
-}
-
-/// `y += A x` from the lower triangle by columns, diagonal first.
-#[inline(always)]
-fn multiply_symmetric<const W: usize>(a: &Entries, values: &[f64], x: &[[f64; W]], y: &mut [[f64; W]]) {
-    for column in 0..x.len() {
-        let (of_column, mut sum) = (x[column], [0.0; W]);
-        for (k, (row, value)) in a.line(column, values).enumerate() {
-            let of_row = x[row];
-            (0..W).for_each(|l| sum[l] += value * of_row[l]);
-            if k > 0 {
-                let y = &mut y[row];
-                (0..W).for_each(|l| y[l] += value * of_column[l]);
-            }
-        }
-        (0..W).for_each(|l| y[column][l] += sum[l]);
     }
 }
 

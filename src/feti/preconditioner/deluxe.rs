@@ -221,8 +221,7 @@ impl OwnSide {
     /// springs, which are taken off again.
     fn stiffness(&self, with_interior: &Submatrix, values: &[f64]) -> Mat<f64> {
         let Submatrix { unknowns, block, cholesky } = with_interior;
-        let (n, mut entries) = (self.dofs.len(), Vec::new());
-        block.take(values, &mut entries);
+        let (n, mut entries) = (self.dofs.len(), block.values(values).collect::<Vec<_>>());
         let mut line = vec![None; unknowns.len()];
         for (k, dof) in self.dofs.iter().enumerate() {
             line[unknowns.binary_search(dof).expect("the face is part of it")] = Some(k);

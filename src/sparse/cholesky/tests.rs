@@ -26,7 +26,7 @@ fn solves_in_any_order_and_one_workspace_serves_all() {
                 (Precision::Single, 1.0, 1e-6),
                 (Precision::Single, 1e-60, 1e-6),
             ] {
-                let mut factor = Factor::new(analysis, precision);
+                let mut factor = analysis.factor(precision);
                 workspace.factorise(analysis, Lower { column_begin, rows }, values, &mut factor).expect("definite");
                 let n = *n as usize;
                 let mut x: Vec<f64> = (0..n).map(|k| size * (k as f64).sin()).collect();
@@ -47,7 +47,7 @@ fn a_breakdown_names_the_unknown() {
     let lower = Lower { column_begin: &column_begin, rows: &rows };
     let analysis = Analysis::ordered(lower, &[0, 1, 4, 2, 3, 5]);
     for precision in [Precision::Single, Precision::Double] {
-        let mut factor = Factor::new(&analysis, precision);
+        let mut factor = analysis.factor(precision);
         let outcome = Workspace::new([&analysis]).factorise(&analysis, lower, &values, &mut factor);
         let breakdown = outcome.expect_err("the diagonal is negative");
         assert_eq!(breakdown.unknown, 4);
@@ -61,7 +61,7 @@ fn pivots_and_complements_of_a_chain() {
     // The ends meet at the third, then at the fourth unknown.
     let analysis = Analysis::ordered(lower, &[0, 1, 5, 4, 3, 2]);
     for precision in [Precision::Single, Precision::Double] {
-        let mut factor = Factor::new(&analysis, precision);
+        let mut factor = analysis.factor(precision);
         Workspace::new([&analysis]).factorise(&analysis, lower, &values, &mut factor).expect("definite");
         // The pivots of either half are 3, 3 - 1/3, ..., as of the continued fraction.
         let (second, fourth) = (3.0 - 1.0 / 3.0, 3.0 - 1.0 / (3.0 - 1.0 / 3.0));
