@@ -14,6 +14,9 @@ pub const LOOSEST: f64 = 0.03;
 pub const TIGHTEST: f64 = 1e-4;
 /// Factor on the squared decrease of the residual.
 const SHARE: f64 = 0.5;
+/// The floor in the beginning: at the scene's tolerance itself the last true residual is just above the one that is enough, more
+/// often than not.
+const FLOOR: f64 = 0.5;
 /// What the floor is lowered by beyond the ratio of wanted to true residual.
 const MARGIN: f64 = 0.3;
 
@@ -31,7 +34,7 @@ pub struct Forcing {
 
 impl Default for Forcing {
     fn default() -> Self {
-        Self { drop: FIRST, floor: 1.0, left: 0.0 }
+        Self { drop: FIRST, floor: FLOOR, left: 0.0 }
     }
 }
 
@@ -63,11 +66,11 @@ mod tests {
     fn accuracy_follows_the_residual() {
         let mut forcing = Forcing::default();
         forcing.update(1.0, 0.5, 1e-6, false);
-        assert_eq!(forcing, Forcing { drop: LOOSEST, floor: 1.0, left: 2e-6 });
+        assert_eq!(forcing, Forcing { drop: LOOSEST, floor: FLOOR, left: 2e-6 });
         forcing.update(0.5, 0.05, 1e-6, false);
         assert!((forcing.drop - SHARE * 0.01).abs() < 1e-15);
         forcing.update(0.05, 1e-5, 1e-6, true);
         assert_eq!((forcing.drop, forcing.left), (TIGHTEST, LOOSEST));
-        assert!((forcing.floor - 0.1 * MARGIN).abs() < 1e-15);
+        assert!((forcing.floor - FLOOR * 0.1 * MARGIN).abs() < 1e-15);
     }
 }
