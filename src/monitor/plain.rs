@@ -5,7 +5,7 @@
 
 use super::events::{Event, Sink};
 use super::table::{Phase, PhaseTable, Spread};
-use crate::record::counts::{ContactRow, Sizes};
+use crate::record::counts::{ContactRow, Sizes, Work};
 use crate::record::rows::NewtonRow;
 use crate::record::state::{Errors, Residuals};
 
@@ -118,34 +118,30 @@ fn newton_line(row: &NewtonRow) -> String {
 }
 
 fn phase_lines(table: &PhaseTable) -> Vec<String> {
-    let line = |name: &str, calls: String, spread: Spread, rates: [String; 2]| {
+    let line = |name: &str, calls: String, spread: Spread, rates: [String; 3]| {
         let ratio = spread.ratio().map_or("-".into(), |ratio| format!("{ratio:.2}"));
         let percent = 100.0 * spread.max / table.total_seconds;
-        let [left, right] = rates;
-        let line = format!("{name:<29} {calls:>7} {:>9.3} {ratio:>7} {percent:>5.1} {left:>8} {right:>8}", spread.max);
+        let rates: String = rates.iter().map(|rate| format!(" {rate:>8}")).collect();
+        let line = format!("{name:<29} {calls:>7} {:>9.3} {ratio:>7} {percent:>5.1}{rates}", spread.max);
         line.trim_end().to_owned()
     };
     let phase = |phase: &Phase| {
-        let rates = [phase.work.flops, phase.work.bytes].map(|work| match work / phase.seconds.max / 1e9 {
-            rate if work > 0.0 => format!("{rate:.2}"),
-            _ => String::new(),
-        });
+        let Work { flops, bytes } = phase.work;
+        let seconds = phase.seconds.max * 1e9;
+        let rates = [(flops, seconds), (bytes, seconds), (bytes, phase.calls as f64 * 1e6)];
+        let rates = rates.map(|(work, per)| if work > 0.0 { format!("{:.2}", work / per) } else { String::new() });
         line(&phase.name, phase.calls.to_string(), phase.seconds, rates)
     };
     let messages = |kind: &Phase| {
         let volume = format!("{:.2} MiB", kind.work.bytes / f64::from(1 << 20));
-        line(&kind.name, kind.calls.to_string(), kind.seconds, [String::new(), volume])
+        line(&kind.name, kind.calls.to_string(), kind.seconds, [String::new(), volume, String::new()])
     };
     let (total, memory) = (table.total_seconds, table.memory_mb);
-    let head = [["phase", "messages, with waiting"], ["GF/s", ""], ["GB/s", ""]];
-    let header = |of: usize| {
-        let [name, left, right] = head.map(|names| names[of]);
-        format!("{name:<29} {:>7} {:>9} {:>7} {:>5} {left:>8} {right:>8}", "calls", "max s", "max/min", "%")
-    };
-    let mut lines = vec![header(0)];
+    let header = |name: &str| format!("{name:<29} {:>7} {:>9} {:>7} {:>5}", "calls", "max s", "max/min", "%");
+    let mut lines = vec![format!("{} {:>8} {:>8} {:>8}", header("phase"), "GF/s", "GB/s", "MB/call")];
     lines.extend(table.phases.iter().map(phase));
     if !table.communication.is_empty() {
-        lines.push(header(1).trim_end().to_owned());
+        lines.push(header("messages, with waiting"));
         lines.extend(table.communication.iter().map(messages));
     }
     lines.push(line("all but messages", String::new(), table.busy, Default::default()));
