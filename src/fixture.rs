@@ -246,7 +246,7 @@ impl<'a> Setup<'a> {
 
     /// The values of the rows that count for own subdomains: in rank order, all rows once and in one order.
     pub fn owned(&self, rows: &[f64]) -> Vec<f64> {
-        self.space.owned().iter().flatten().map(|&row| rows[row as usize]).collect()
+        self.space.owned().iter().flat_map(|owned| &rows[owned.clone()]).copied().collect()
     }
 
     /// `B`, on a single rank.

@@ -13,9 +13,16 @@ use crate::contact::ContactPair;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
 /// Nodes tied together by contact and short edges, and the contact pairs among them.
+#[derive(Clone)]
 struct Cluster {
     nodes: BTreeSet<u64>,
     pairs: Vec<usize>,
+}
+
+impl Cluster {
+    fn alone(node: u64) -> Self {
+        Self { nodes: BTreeSet::from([node]), pairs: Vec::new() }
+    }
 }
 
 impl Constraints {
@@ -38,6 +45,14 @@ impl Constraints {
         let node = |number: u64| clustered.get(&number).or_else(|| own.get(&number).copied());
 
         let keys: BTreeSet<u64> = own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
+        let of_key = |key: u64| clusters.get(&key).map_or_else(|| Cluster::alone(key), Clone::clone);
+        let subdomains = |key: u64| -> BTreeSet<u32> {
+            of_key(key).nodes.into_iter().filter_map(node).flat_map(|n| n.copies.iter().copied()).collect()
+        };
+        // By subdomains, so that what counts for one is in one place, and neighbours' rows are.
+        let mut keys: Vec<(Vec<u32>, u64)> =
+            keys.into_iter().map(|key| (subdomains(key).into_iter().collect(), key)).collect();
+        keys.sort_unstable();
         let mut result = Self {
             rows: Vec::new(),
             blocks: Vec::new(),
@@ -51,9 +66,8 @@ impl Constraints {
             ties,
             idle: Vec::new(),
         };
-        for key in keys {
-            let single = Cluster { nodes: BTreeSet::from([key]), pairs: Vec::new() };
-            let cluster = clusters.get(&key).unwrap_or(&single);
+        for (subdomains, key) in keys {
+            let cluster = of_key(key);
             let mut rows = Vec::new();
             let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
             for interface in cluster.nodes.iter().filter_map(|&number| node(number)) {
@@ -72,8 +86,7 @@ impl Constraints {
             }
             rows.extend(contacts.into_values().flatten());
             rows.iter_mut().for_each(|row| row.weigh(stiffness, largest));
-            let subdomains: BTreeSet<u32> = sides.values().flat_map(|(n, _)| n.copies.iter().copied()).collect();
-            result.push_block(rows, subdomains.into_iter().collect(), decomposition);
+            result.push_block(rows, subdomains, decomposition);
         }
         result
     }

@@ -196,12 +196,12 @@ impl TornProblem<'_> {
 
     /// Number of contact rows that are closed. One collective.
     pub fn active_contacts(&self, lambda: &[f64]) -> usize {
-        let active = |row: u32| {
-            let of = &self.constraints.rows[row as usize];
-            of.kind.is_contact() && of.law().status(lambda[row as usize]).is_closed()
+        let active = |row: &usize| {
+            let of = &self.constraints.rows[*row];
+            of.kind.is_contact() && of.law().status(lambda[*row]).is_closed()
         };
         let partial: Vec<f64> =
-            self.space.owned().iter().map(|rows| rows.iter().filter(|&&row| active(row)).count() as f64).collect();
+            self.space.owned().iter().map(|rows| rows.clone().filter(active).count() as f64).collect();
         self.space.sum(&partial, 1)[0] as usize
     }
 }

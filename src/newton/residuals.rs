@@ -111,9 +111,8 @@ impl TornProblem<'_> {
         self.gather.apply(&self.unbalanced(state, lambda), &mut rows);
         let mut partial = vec![0.0; 3 * supports * self.space.owned().len()];
         for (sum, owned) in partial.chunks_exact_mut((3 * supports).max(1)).zip(self.space.owned()) {
-            for &row in owned {
-                let (value, force, row) =
-                    (rows[row as usize], lambda[row as usize], &self.constraints.rows[row as usize]);
+            for row in owned.clone() {
+                let (value, force, row) = (rows[row], lambda[row], &self.constraints.rows[row]);
                 if let Kind::Support { support, axis } = row.kind {
                     sum[3 * support + axis] -= value / row.scale;
                 }

@@ -21,8 +21,8 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
     for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
         let touches = subdomain.facets.iter().any(|facet| discrete.contacts.surfaces.contains(&facet.surface));
         let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0, f64::from(touches)];
-        for &row in rows {
-            counts[match constraints.rows[row as usize].kind {
+        for row in rows.clone() {
+            counts[match constraints.rows[row].kind {
                 Kind::Gluing => 1,
                 Kind::Support { .. } => 2,
                 Kind::Contact { .. } => 3,

@@ -83,8 +83,8 @@ pub(super) fn measure(
     for ((subdomain, u), rows) in subdomains {
         let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
         add_body(&mut worst, subdomain, u, diagonal(&discrete.extents[subdomain.body]));
-        for &row in rows {
-            let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind else { continue };
+        for row in rows.clone() {
+            let Kind::Contact { pair } = problem.constraints.rows[row].kind else { continue };
             if state_of[pair].is_some_and(Status::is_closed) {
                 add_contact(&mut worst, scene, discrete, pair, at, &of_nodes);
             }

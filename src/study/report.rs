@@ -250,8 +250,8 @@ fn contact_forces(
     let mut partial = Vec::new();
     for rows in problem.space.owned() {
         let mut sums = vec![[0.0; 3]; names.len()];
-        for &row in rows {
-            if let Kind::Contact { pair } = problem.constraints.rows[row as usize].kind {
+        for row in rows.clone() {
+            if let Kind::Contact { pair } = problem.constraints.rows[row].kind {
                 let contact = pairs[pair].contact;
                 let force = pairs[pair].force(of_pair[pair].unwrap_or_default());
                 sums[contact].iter_mut().zip(force).for_each(|(sum, f)| *sum += signs[contact] * f);

@@ -1,37 +1,47 @@
 //! Inner products of dual vectors and sums over subdomains, the same bits on any number of ranks.
 //!
-//! Each row counts for the lowest subdomain of its block. Products are summed per subdomain in row order, then over
-//! the subdomains in their order on rank 0.
+//! Each row counts for the lowest subdomain of its block; these rows are one behind the other. Products are summed per
+//! subdomain, every [`LANES`]th row in one sum, then over the subdomains in their order on rank 0.
+
+use std::ops::Range;
 
 use crate::comm::{Comm, Shares, all_gather_u64, maximum, ordered_sum};
 use crate::constraint::Constraints;
 use crate::feti::Torn;
+use crate::simd::vectorised;
 use crate::vector::dot;
+
+/// Sums of an inner product side by side.
+const LANES: usize = 8;
+/// Inner products that are found together.
+const TOGETHER: usize = 4;
 
 /// Inner products over all rows of all ranks.
 pub struct RowSpace<'a> {
     comm: &'a dyn Comm,
     shares: Shares,
     /// For each own subdomain, the rows that count for it.
-    owned: Vec<Vec<u32>>,
+    owned: Vec<Range<usize>>,
 }
 
 impl<'a> RowSpace<'a> {
     /// Over the rows of `constraints`.
     pub fn new(comm: &'a dyn Comm, shares: &Shares, constraints: &Constraints) -> Self {
         let first = shares.begin(comm.rank());
-        let mut owned = vec![Vec::new(); shares.0[comm.rank()]];
+        let mut owned = vec![0..0; shares.0[comm.rank()]];
         for (rows, subdomains) in constraints.blocks.iter().zip(&constraints.block_subdomains) {
             let own = (subdomains[0] as usize).checked_sub(first).and_then(|k| owned.get_mut(k));
-            if let Some(list) = own {
-                list.extend(rows.clone().map(|row| row as u32));
+            if let Some(owned) = own {
+                let goes_on = owned.end == rows.start;
+                debug_assert!(goes_on || *owned == (0..0), "blocks are in the order of subdomains");
+                *owned = if goes_on { owned.start } else { rows.start }..rows.end;
             }
         }
         Self { comm, shares: shares.clone(), owned }
     }
 
     /// For each own subdomain, the rows that count for it: every row counts exactly once over all ranks.
-    pub fn owned(&self) -> &[Vec<u32>] {
+    pub fn owned(&self) -> &[Range<usize>] {
         &self.owned
     }
 
@@ -42,19 +52,14 @@ impl<'a> RowSpace<'a> {
 
     /// The parts of `x'y` that count for each own subdomain, pair by pair.
     pub fn partial(&self, pairs: &[(&[f64], &[f64])]) -> Vec<f64> {
-        let mut partial = Vec::with_capacity(self.owned.len() * pairs.len());
-        // Four sums side by side: each is a chain of additions.
-        let (fours, others) = pairs.as_chunks::<4>();
-        for rows in &self.owned {
-            for four in fours {
-                let mut sums = [-0.0; 4];
-                for &r in rows {
-                    sums.iter_mut().zip(four).for_each(|(sum, (x, y))| *sum += x[r as usize] * y[r as usize]);
+        let mut partial = vec![0.0; self.owned.len() * pairs.len()];
+        for (rows, sums) in self.owned.iter().zip(partial.chunks_exact_mut(pairs.len().max(1))) {
+            for (pairs, sums) in pairs.chunks(TOGETHER).zip(sums.chunks_mut(TOGETHER)) {
+                if let Ok(pairs) = <&[_; TOGETHER]>::try_from(pairs) {
+                    sums.copy_from_slice(&products(rows, pairs));
+                } else {
+                    pairs.iter().zip(sums).for_each(|(pair, sum)| [*sum] = products(rows, &[*pair]));
                 }
-                partial.extend(sums);
-            }
-            for (x, y) in others {
-                partial.push(rows.iter().map(|&r| x[r as usize] * y[r as usize]).sum());
             }
         }
         partial
@@ -75,8 +80,8 @@ impl<'a> RowSpace<'a> {
         let mine: Vec<u64> = self
             .owned
             .iter()
-            .flatten()
-            .filter_map(|&row| of(row as usize))
+            .flat_map(Range::clone)
+            .filter_map(of)
             .flat_map(|numbers| numbers.into_iter().map(f64::to_bits))
             .collect();
         let numbers: Vec<f64> = all_gather_u64(self.comm, &mine).into_iter().map(f64::from_bits).collect();
@@ -99,6 +104,26 @@ impl<'a> RowSpace<'a> {
     pub fn maximum(&self, mine: f64) -> f64 {
         maximum(self.comm, &[mine])[0]
     }
+}
+
+/// `x'y` of each pair over some rows.
+fn products<const N: usize>(rows: &Range<usize>, pairs: &[(&[f64], &[f64]); N]) -> [f64; N] {
+    let of_rows = pairs.map(|(x, y)| (&x[rows.clone()], &y[rows.clone()]));
+    let mut sums = [[0.0; LANES]; N];
+    vectorised(
+        (&mut sums, &of_rows),
+        #[inline(always)]
+        |(sums, pairs)| {
+            for (sums, (x, y)) in sums.iter_mut().zip(pairs) {
+                let ((x, of_x), (y, of_y)) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>());
+                for (x, y) in x.iter().zip(y) {
+                    (0..LANES).for_each(|l| sums[l] += x[l] * y[l]);
+                }
+                sums.iter_mut().zip(of_x.iter().zip(of_y)).for_each(|(sum, (x, y))| *sum += x * y);
+            }
+        },
+    );
+    sums.map(|sums| sums.iter().sum())
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 //! | `contacts` | a contact row, by what tells it from others on other subdomains, too |
 //! | `histories`, `flow`, `factor_flow`, `interior_flow` | an integration point |
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::{contact, lowest_node};
@@ -28,7 +29,7 @@ pub(super) struct Packer<'a> {
     discrete: &'a Discrete,
     newton: &'a Snapshot,
     /// Rows that each own subdomain owns.
-    owned: Vec<Vec<usize>>,
+    owned: Vec<Range<usize>>,
     /// First own subdomain.
     first: usize,
     /// Where factors of whole subdomains, and those of their interiors, were made.
@@ -45,7 +46,7 @@ impl<'a> Packer<'a> {
         Self {
             discrete,
             newton,
-            owned: space.owned().iter().map(|rows| rows.iter().map(|&row| row as usize).collect()).collect(),
+            owned: space.owned().to_vec(),
             first: shares.begin(comm.rank()),
             factor: of_bases(|bases| &bases.factor),
             interior: of_bases(|bases| &bases.interior),
@@ -99,7 +100,7 @@ impl<'a> Packer<'a> {
 
     fn rows(&self) -> Vec<Field> {
         let rows = &self.discrete.constraints.rows;
-        let owned = || self.owned.iter().flatten().copied();
+        let owned = || self.owned.iter().flat_map(Range::clone);
         vec![
             Field::integer("rows/node", owned().map(|row| lowest_node(&rows[row]) as i64).collect()),
             Field::integer("rows/kept", owned().map(|row| i64::from(self.is_kept(row))).collect()),
@@ -110,9 +111,9 @@ impl<'a> Packer<'a> {
 
     fn contacts(&self) -> Vec<Field> {
         let rows = &self.discrete.constraints.rows;
-        let owned = self.owned.iter().flatten();
+        let owned = self.owned.iter().flat_map(Range::clone);
         let contacts: Vec<(usize, [i64; 3])> =
-            owned.filter_map(|&row| Some((row, contact(self.discrete, row)?))).collect();
+            owned.filter_map(|row| Some((row, contact(self.discrete, row)?))).collect();
         let force = |row: usize| rows[row].scale * self.last_multiplier(row);
         vec![
             Field::of("contacts/condition", 3, Values::Integer(contacts.iter().flat_map(|(_, key)| *key).collect())),

@@ -1,6 +1,7 @@
 //! Arrays of a checkpoint on the same subdomains as there: each rank reads its own rows, and everything is as it was.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use super::arrays::basis;
 use super::{Arrays, Recorded, lowest_node};
@@ -66,7 +67,7 @@ struct Reader<'a> {
     discrete: &'a Discrete,
     file: &'a Checkpoint<'a>,
     /// Rows that each own subdomain owns.
-    owned: Vec<Vec<u32>>,
+    owned: Vec<Range<usize>>,
     alone: Part,
     points: Part,
     cells: Part,
@@ -96,7 +97,7 @@ impl<'a> Reader<'a> {
         let clusters = (self.alone.begin..self.alone.begin + own.len()).map(|id| decomposition.clusters.of(id) as i64);
         let nodes = own.iter().flat_map(|s| &s.nodes).map(|&node| node as i64);
         let elements = own.iter().flat_map(|s| s.elements.iter().flat_map(|element| key(element, &s.nodes)));
-        let rows = self.owned.iter().flatten().map(|&row| lowest_node(&constraints.rows[row as usize]) as i64);
+        let rows = self.owned.iter().flat_map(Range::clone).map(|row| lowest_node(&constraints.rows[row]) as i64);
         // All of them are read: reading is collective.
         Ok(self.alone.read::<i64>(file, "subdomains/cluster", 0)?.into_iter().eq(clusters)
             & self.points.read::<i64>(file, "points/node", 0)?.into_iter().eq(nodes)
@@ -134,8 +135,8 @@ impl<'a> Reader<'a> {
         let kept = self.rows.read::<i64>(file, "rows/kept", 0)?;
         let mut of_rows = vec![[0; 3]; discrete.constraints.rows.len()];
         let values = multiplier.into_iter().zip(last).zip(kept);
-        for (row, ((multiplier, last), kept)) in self.owned.iter().flatten().zip(values) {
-            of_rows[*row as usize] = [multiplier.to_bits(), last.to_bits(), kept as u64];
+        for (row, ((multiplier, last), kept)) in self.owned.iter().flat_map(Range::clone).zip(values) {
+            of_rows[row] = [multiplier.to_bits(), last.to_bits(), kept as u64];
         }
         complete(comm, discrete, &mut of_rows);
         Ok(of_rows.iter().map(|row| ([row[0], row[1]].map(f64::from_bits), row[2] == 1)).unzip())
