@@ -19,6 +19,8 @@ const GRID: f64 = (1 << 24) as f64;
 const NEAREST: usize = 24;
 /// How often centres move with a sample of the elements, and with all of them.
 const ROUNDS: [usize; 2] = [100, 4];
+/// After so many rounds it is found anew which parts are near.
+const RENEWAL: usize = 8;
 /// How often weights are adapted between.
 const ADAPTIONS: usize = 3;
 /// Elements of a part that make up the sample.
@@ -36,8 +38,15 @@ pub fn compact(comm: &dyn Comm, points: &[[i32; 3]], part: &mut [u32], wholes: &
     let sample: Vec<usize> = (0..points.len()).filter(|&at| scattered(points[at]).is_multiple_of(stride)).collect();
     let of_sample: Vec<[i32; 3]> = sample.iter().map(|&at| points[at]).collect();
     let mut its_part: Vec<u32> = sample.iter().map(|&at| part[at]).collect();
-    (0..ROUNDS[0]).for_each(|_| round(comm, &mut cells, &of_sample, &mut its_part, wholes));
-    (0..ROUNDS[1]).for_each(|_| round(comm, &mut cells, points, part, wholes));
+    let mut near = Vec::new();
+    for turn in 0..ROUNDS[0] {
+        if turn % RENEWAL == 0 {
+            near = nearest(&cells, wholes);
+        }
+        round(comm, (&mut cells, &near), &of_sample, &mut its_part, wholes);
+    }
+    near = nearest(&cells, wholes);
+    (0..ROUNDS[1]).for_each(|_| round(comm, (&mut cells, &near), points, part, wholes));
 }
 
 /// A number that tells nothing of where the point is.
@@ -47,10 +56,9 @@ fn scattered(point: [i32; 3]) -> u64 {
 }
 
 /// Adapts weights, then moves the centres.
-fn round(comm: &dyn Comm, cells: &mut [Cell], points: &[[i32; 3]], part: &mut [u32], wholes: &Wholes) {
-    let near = nearest(cells, wholes);
+fn round(comm: &dyn Comm, (cells, near): (&mut [Cell], &Near), points: &[[i32; 3]], part: &mut [u32], wholes: &Wholes) {
     for _ in 0..ADAPTIONS {
-        let sizes = sum(comm, assign(cells, &near, points, part));
+        let sizes = sum(comm, assign(cells, near, points, part));
         let mut of_wholes = vec![0; wholes.len()];
         (0..).zip(&sizes).for_each(|(part, size)| of_wholes[wholes.of_part(part) as usize] += size);
         let off = |(part, size): (u32, &u64)| {
@@ -68,6 +76,9 @@ fn round(comm: &dyn Comm, cells: &mut [Cell], points: &[[i32; 3]], part: &mut [u
     }
     move_centres(comm, cells, points, part);
 }
+
+/// Of each part, the nearest ones of the same whole and how far away they are, itself first.
+type Near = [Vec<(f64, u32)>];
 
 /// What elements of a part have in common.
 #[derive(Clone, Default)]
@@ -146,7 +157,7 @@ fn nearest(cells: &[Cell], wholes: &Wholes) -> Vec<Vec<(f64, u32)>> {
 }
 
 /// Puts every element into its part. Returns how many are in each.
-fn assign(cells: &[Cell], near: &[Vec<(f64, u32)>], points: &[[i32; 3]], part: &mut [u32]) -> Vec<u64> {
+fn assign(cells: &[Cell], near: &Near, points: &[[i32; 3]], part: &mut [u32]) -> Vec<u64> {
     let most = |near: &Vec<(f64, u32)>| near.iter().map(|&(_, k)| cells[k as usize].weight).fold(f64::MIN, f64::max);
     let most: Vec<f64> = near.iter().map(most).collect();
     let mut sizes = vec![0; cells.len()];

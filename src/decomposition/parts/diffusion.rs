@@ -46,6 +46,19 @@ impl<T> Lists<T> {
 /// Parts and how much of them there is.
 type Mixture = Lists<(u32, u32)>;
 
+impl Mixture {
+    /// Appends the mean of what some members have, if that is one part and nothing else. Says whether it is.
+    fn push_pure(&mut self, of: &Mixture, members: &[u32]) -> bool {
+        let Some(&[pure @ (_, ONE)]) = members.first().map(|&first| of.of(first as usize)) else { return false };
+        let is_pure = members.iter().all(|&member| *of.of(member as usize) == [pure]);
+        if is_pure {
+            self.items.push(pure);
+            self.begin.push(self.items.len() as u32);
+        }
+        is_pure
+    }
+}
+
 /// The same before it is divided by the number of elements.
 type Sums = Vec<(u32, u64)>;
 
@@ -147,6 +160,7 @@ impl<'a> Ground<'a> {
             sums.clear();
             match shared.get_mut(node).and_then(Option::take) {
                 Some(of_all) => sums = of_all,
+                None if result.push_pure(mixture, self.around.of(node)) => continue,
                 None => add(mixture, self.around.of(node), &mut sums),
             }
             push_mean(&mut sums, count, &mut result);
@@ -160,6 +174,9 @@ impl<'a> Ground<'a> {
         let mut sums = Vec::new();
         for element in 0..self.corners.len() {
             let corners = self.corners.of(element);
+            if result.push_pure(mixture, corners) {
+                continue;
+            }
             sums.clear();
             add(mixture, corners, &mut sums);
             push_mean(&mut sums, corners.len() as u64, &mut result);
@@ -169,9 +186,21 @@ impl<'a> Ground<'a> {
 
     /// Puts every element into the part that has most of it, at prices that keep the parts equally large.
     fn assign(&self, mixture: &Mixture, prices: &mut [f64], part: &mut [u32], wholes: &Wholes) {
+        // Prices decide only where parts mix.
+        let mut certain = vec![0; prices.len()];
+        let mut mixed = Vec::new();
+        for (element, part) in part.iter_mut().enumerate() {
+            if let &[(only, _)] = mixture.of(element) {
+                *part = only;
+                certain[only as usize] += 1;
+            } else {
+                mixed.push(element);
+            }
+        }
         for _ in 0..ADAPTIONS {
-            let mut sizes = vec![0; prices.len()];
-            for (element, part) in part.iter_mut().enumerate() {
+            let mut sizes = certain.clone();
+            for &element in &mixed {
+                let part = &mut part[element];
                 let mut best = (0.0, *part);
                 for &(other, value) in mixture.of(element) {
                     let value = f64::from(value) * prices[other as usize];

@@ -5,7 +5,7 @@
 //! They are made compact ([`compact`]), then their faces smooth ([`diffusion`]) and flat ([`sides`]), then whole ([`pieces`]). Regions of bodies
 //! are cut one by one: a part never spans two bodies or two materials. Elements of a body cost the same, as they have one
 //! kind; between bodies they count as so many linear tetrahedra. In the end each rank gets the elements of its own
-//! subdomains.
+//! subdomains, which are shared out by the size of their factors.
 
 mod compact;
 mod curve;
@@ -17,6 +17,7 @@ mod sides;
 mod wholes;
 
 use std::collections::{BTreeMap, HashMap};
+use std::mem::replace;
 
 use self::compact::{compact, on_grid};
 use self::diffusion::Ground;
@@ -59,10 +60,7 @@ pub(crate) fn own_subdomains(
     // Numbers and owners.
     let order = interleave(&cuts.iter().map(|cut| cut.clusters.len()).collect::<Vec<_>>());
     let members = |&(body, cluster): &(usize, usize)| cuts[body].clusters[cluster].as_slice();
-    let cost = |at: &(usize, usize)| -> u64 {
-        let elements = members(at).iter().map(|&part| cuts[at.0].sizes[part as usize]);
-        elements.sum::<u64>() * bodies.bodies[at.0].kind.tetrahedra()
-    };
+    let cost = |at: &(usize, usize)| members(at).iter().map(|&part| cuts[at.0].costs[part as usize]).sum();
     let shares = by_cost(&order.iter().map(cost).collect::<Vec<_>>(), comm.size());
     let mut places: Vec<Vec<(usize, usize)>> = cuts.iter().map(|cut| vec![(0, 0); cut.sizes.len()]).collect();
     let mut id = 0;
@@ -144,6 +142,8 @@ struct Cut {
     portion: Portion,
     /// Elements of each part.
     sizes: Vec<u64>,
+    /// Work with each part.
+    costs: Vec<u64>,
     /// Parts of each cluster, ascending.
     clusters: Vec<Vec<u32>>,
     of_wholes: Vec<[usize; 2]>,
@@ -211,7 +211,8 @@ impl Cut {
         let group = from_root(comm, group);
         let mut clusters = vec![Vec::new(); group.iter().max().map_or(0, |&last| last as usize + 1)];
         (0..).zip(group).for_each(|(part, group)| clusters[group as usize].push(part));
-        (Self { portion, sizes, clusters, of_wholes: Vec::new() }, of)
+        let costs = costs(&portion, count, comm);
+        (Self { portion, sizes, costs, clusters, of_wholes: Vec::new() }, of)
     }
 
     /// Own subdomains, from the number and the owner of each part. Collective.
@@ -243,6 +244,23 @@ impl Cut {
         };
         order.chunk_by(|&a, &b| portion.part[a] == portion.part[b]).map(subdomain).collect()
     }
+}
+
+/// The size of each part's factor, which is read for every application of F: nodes to the power of 4/3, as by nested dissection of
+/// cubes (George and Liu 1981). A part of several ranks counts as their pieces together. Collective.
+fn costs(portion: &Portion, parts: usize, comm: &dyn Comm) -> Vec<u64> {
+    let mut order: Vec<u32> = (0..portion.len() as u32).collect();
+    order.sort_by_key(|&at| portion.part[at as usize]);
+    let (mut last, mut nodes) = (vec![u32::MAX; portion.nodes.len()], vec![0; parts]);
+    for at in order {
+        let part = portion.part[at as usize];
+        for &node in portion.elements.get(at as usize) {
+            if replace(&mut last[node as usize], part) != part {
+                nodes[part as usize] += 1;
+            }
+        }
+    }
+    sum(comm, nodes).into_iter().map(|nodes| (nodes as f64).powf(4.0 / 3.0) as u64).collect()
 }
 
 /// Named surfaces of the boundary faces of a mesh, by ascending nodes, on every rank; none of a brick. Collective.
