@@ -44,7 +44,7 @@ MESSAGES = ("collectives", "neighbour exchange")
 HEAD = """\
 ## Users' meshes
 
-Parts with unstructured, graded meshes of linear tetrahedra ([scenes/peers](../scenes/peers)), cut by METIS. Meshes are made
+Parts with unstructured, graded meshes of linear tetrahedra ([scenes/peers](../scenes/peers)). Meshes are made
 before the runs. All programs read the same scene and the same mesh, and that is a part of their time.
 
 - `housing`: a bearing housing that is bolted down and yields; `housing-floor`: the same on a rigid floor.
