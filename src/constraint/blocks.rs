@@ -13,16 +13,9 @@ use crate::contact::ContactPair;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
 /// Nodes tied together by contact and short edges, and the contact pairs among them.
-#[derive(Clone)]
 struct Cluster {
     nodes: BTreeSet<u64>,
     pairs: Vec<usize>,
-}
-
-impl Cluster {
-    fn alone(node: u64) -> Self {
-        Self { nodes: BTreeSet::from([node]), pairs: Vec::new() }
-    }
 }
 
 impl Constraints {
@@ -45,14 +38,11 @@ impl Constraints {
         let node = |number: u64| clustered.get(&number).or_else(|| own.get(&number).copied());
 
         let keys: BTreeSet<u64> = own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
-        let of_key = |key: u64| clusters.get(&key).map_or_else(|| Cluster::alone(key), Clone::clone);
-        let subdomains = |key: u64| -> BTreeSet<u32> {
-            of_key(key).nodes.into_iter().filter_map(node).flat_map(|n| n.copies.iter().copied()).collect()
+        let nodes = |key: u64| -> Vec<&InterfaceNode> {
+            clusters
+                .get(&key)
+                .map_or(node(key).into_iter().collect(), |c| c.nodes.iter().filter_map(|&n| node(n)).collect())
         };
-        // By subdomains, so that what counts for one is in one place, and neighbours' rows are.
-        let mut keys: Vec<(Vec<u32>, u64)> =
-            keys.into_iter().map(|key| (subdomains(key).into_iter().collect(), key)).collect();
-        keys.sort_unstable();
         let mut result = Self {
             rows: Vec::new(),
             blocks: Vec::new(),
@@ -66,18 +56,17 @@ impl Constraints {
             ties,
             idle: Vec::new(),
         };
-        for (subdomains, key) in keys {
-            let cluster = of_key(key);
+        for (subdomains, key) in by_subdomains(keys, nodes) {
             let mut rows = Vec::new();
             let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
-            for interface in cluster.nodes.iter().filter_map(|&number| node(number)) {
+            for interface in nodes(key) {
                 let fixed = dirichlet::fixed(interface, supports);
                 rows.extend(gluing::rows(interface, &decomposition.clusters, stiffness));
                 rows.extend(dirichlet::rows(interface, &fixed));
                 sides.insert(interface.node, (interface, fixed));
             }
             let mut contacts: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
-            for &number in &cluster.pairs {
+            for &number in clusters.get(&key).iter().flat_map(|cluster| &cluster.pairs) {
                 let pair = &pairs[number];
                 match contact::row(number, pair, |node| sides[&node]) {
                     Ok(row) => contact::add_tightest(contacts.entry(pair.slave).or_default(), row, at),
@@ -170,6 +159,15 @@ fn clusters(pairs: &[ContactPair], ties: &Ties) -> (HashMap<u64, u64>, BTreeMap<
         clusters.get_mut(&names[&pair.slave]).expect("every name has its cluster").pairs.push(number);
     }
     (names, clusters)
+}
+
+/// Keys of blocks with the subdomains of their nodes, in the order of these: what counts for one subdomain is in one place, and
+/// neighbours' rows are.
+fn by_subdomains<'a>(keys: BTreeSet<u64>, nodes: impl Fn(u64) -> Vec<&'a InterfaceNode>) -> Vec<(Vec<u32>, u64)> {
+    let of = |key: u64| -> BTreeSet<u32> { nodes(key).iter().flat_map(|n| n.copies.iter().copied()).collect() };
+    let mut keys: Vec<(Vec<u32>, u64)> = keys.into_iter().map(|key| (of(key).into_iter().collect(), key)).collect();
+    keys.sort_unstable();
+    keys
 }
 
 /// For each own subdomain, its nodes with several copies and how many.

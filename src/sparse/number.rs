@@ -63,6 +63,14 @@ impl Numbers {
         }
     }
 
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Single(numbers) => numbers.len(),
+            Self::Double(numbers) => numbers.len(),
+        }
+    }
+
     /// Their size in bytes.
     pub fn bytes(&self) -> usize {
         match self {

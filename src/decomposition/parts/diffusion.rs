@@ -8,6 +8,7 @@
 //! Each rank has some of the elements and exchanges sums at common nodes. Indicators are integers, so that it does not matter
 //! which elements these are, nor in what order.
 
+use super::common::common;
 use super::portion::Portion;
 use super::sum;
 use super::wholes::Wholes;
@@ -45,19 +46,6 @@ impl<T> Lists<T> {
 
 /// Parts and how much of them there is.
 type Mixture = Lists<(u32, u32)>;
-
-impl Mixture {
-    /// Appends the mean of what some members have, if that is one part and nothing else. Says whether it is.
-    fn push_pure(&mut self, of: &Mixture, members: &[u32]) -> bool {
-        let Some(&[pure @ (_, ONE)]) = members.first().map(|&first| of.of(first as usize)) else { return false };
-        let is_pure = members.iter().all(|&member| *of.of(member as usize) == [pure]);
-        if is_pure {
-            self.items.push(pure);
-            self.begin.push(self.items.len() as u32);
-        }
-        is_pure
-    }
-}
 
 /// The same before it is divided by the number of elements.
 type Sums = Vec<(u32, u64)>;
@@ -110,7 +98,7 @@ impl<'a> Ground<'a> {
         let whole = (0..=portion.len() as u32).map(|k| k * count as u32).collect();
         let around = Lists { begin, items };
         let mut counts: Vec<u64> = (0..nodes.len()).map(|node| around.of(node).len() as u64).collect();
-        let common: Vec<Vec<u32>> = common(comm, &nodes)
+        let common: Vec<Vec<u32>> = common(comm, &nodes.iter().map(|&node| [node]).collect::<Vec<_>>())
             .into_iter()
             .map(|theirs| theirs.into_iter().map(|node| number[node as usize]).collect())
             .collect();
@@ -160,7 +148,6 @@ impl<'a> Ground<'a> {
             sums.clear();
             match shared.get_mut(node).and_then(Option::take) {
                 Some(of_all) => sums = of_all,
-                None if result.push_pure(mixture, self.around.of(node)) => continue,
                 None => add(mixture, self.around.of(node), &mut sums),
             }
             push_mean(&mut sums, count, &mut result);
@@ -174,9 +161,6 @@ impl<'a> Ground<'a> {
         let mut sums = Vec::new();
         for element in 0..self.corners.len() {
             let corners = self.corners.of(element);
-            if result.push_pure(mixture, corners) {
-                continue;
-            }
             sums.clear();
             add(mixture, corners, &mut sums);
             push_mean(&mut sums, corners.len() as u64, &mut result);
@@ -186,21 +170,9 @@ impl<'a> Ground<'a> {
 
     /// Puts every element into the part that has most of it, at prices that keep the parts equally large.
     fn assign(&self, mixture: &Mixture, prices: &mut [f64], part: &mut [u32], wholes: &Wholes) {
-        // Prices decide only where parts mix.
-        let mut certain = vec![0; prices.len()];
-        let mut mixed = Vec::new();
-        for (element, part) in part.iter_mut().enumerate() {
-            if let &[(only, _)] = mixture.of(element) {
-                *part = only;
-                certain[only as usize] += 1;
-            } else {
-                mixed.push(element);
-            }
-        }
         for _ in 0..ADAPTIONS {
-            let mut sizes = certain.clone();
-            for &element in &mixed {
-                let part = &mut part[element];
+            let mut sizes = vec![0; prices.len()];
+            for (element, part) in part.iter_mut().enumerate() {
                 let mut best = (0.0, *part);
                 for &(other, value) in mixture.of(element) {
                     let value = f64::from(value) * prices[other as usize];
@@ -220,31 +192,6 @@ impl<'a> Ground<'a> {
             prices.iter_mut().zip(&off).for_each(|(price, off)| *price *= off.clamp(0.5, 2.0).sqrt().sqrt());
         }
     }
-}
-
-/// Nodes, by their places, that each rank has too; ascending. `nodes` are ascending. Collective.
-fn common(comm: &dyn Comm, nodes: &[u64]) -> Vec<Vec<u32>> {
-    let ranks = comm.size();
-    let mut outgoing = vec![Vec::new(); ranks];
-    // They meet on the rank that the node's number points to.
-    nodes.iter().filter(|_| ranks > 1).for_each(|&node| outgoing[node as u32 as usize % ranks].push(node));
-    let mut reports: Vec<(u64, usize)> = Vec::new();
-    for (rank, theirs) in comm.all_to_all(outgoing).into_iter().enumerate() {
-        reports.extend(theirs.into_iter().map(|node| (node, rank)));
-    }
-    reports.sort_unstable();
-    let mut answers = vec![Vec::new(); ranks];
-    for same in reports.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
-        for &(node, rank) in same {
-            answers[rank].extend(same.iter().filter(|other| other.1 != rank).flat_map(|other| [node, other.1 as u64]));
-        }
-    }
-    let mut common = vec![Vec::new(); ranks];
-    for [node, rank] in comm.all_to_all(answers).iter().flat_map(|theirs| theirs.as_chunks::<2>().0) {
-        common[*rank as usize].push(nodes.binary_search(node).expect("it was reported here") as u32);
-    }
-    common.iter_mut().for_each(|nodes| nodes.sort_unstable());
-    common
 }
 
 /// Adds up what some members have.

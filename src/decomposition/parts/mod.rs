@@ -7,6 +7,7 @@
 //! kind; between bodies they count as so many linear tetrahedra. In the end each rank gets the elements of its own
 //! subdomains, which are shared out by the size of their factors.
 
+mod common;
 mod compact;
 mod curve;
 mod diffusion;
@@ -60,7 +61,8 @@ pub(crate) fn own_subdomains(
     // Numbers and owners.
     let order = interleave(&cuts.iter().map(|cut| cut.clusters.len()).collect::<Vec<_>>());
     let members = |&(body, cluster): &(usize, usize)| cuts[body].clusters[cluster].as_slice();
-    let cost = |at: &(usize, usize)| members(at).iter().map(|&part| cuts[at.0].costs[part as usize]).sum();
+    let costs: Vec<Vec<u64>> = cuts.iter().map(|cut| costs(&cut.portion, cut.sizes.len(), comm)).collect();
+    let cost = |at: &(usize, usize)| members(at).iter().map(|&part| costs[at.0][part as usize]).sum();
     let shares = by_cost(&order.iter().map(cost).collect::<Vec<_>>(), comm.size());
     let mut places: Vec<Vec<(usize, usize)>> = cuts.iter().map(|cut| vec![(0, 0); cut.sizes.len()]).collect();
     let mut id = 0;
@@ -142,8 +144,6 @@ struct Cut {
     portion: Portion,
     /// Elements of each part.
     sizes: Vec<u64>,
-    /// Work with each part.
-    costs: Vec<u64>,
     /// Parts of each cluster, ascending.
     clusters: Vec<Vec<u32>>,
     of_wholes: Vec<[usize; 2]>,
@@ -211,8 +211,7 @@ impl Cut {
         let group = from_root(comm, group);
         let mut clusters = vec![Vec::new(); group.iter().max().map_or(0, |&last| last as usize + 1)];
         (0..).zip(group).for_each(|(part, group)| clusters[group as usize].push(part));
-        let costs = costs(&portion, count, comm);
-        (Self { portion, sizes, costs, clusters, of_wholes: Vec::new() }, of)
+        (Self { portion, sizes, clusters, of_wholes: Vec::new() }, of)
     }
 
     /// Own subdomains, from the number and the owner of each part. Collective.
@@ -247,7 +246,7 @@ impl Cut {
 }
 
 /// The size of each part's factor, which is read for every application of F: nodes to the power of 4/3, as by nested dissection of
-/// cubes (George and Liu 1981). A part of several ranks counts as their pieces together. Collective.
+/// cubes. A part of several ranks counts as their pieces together. Collective.
 fn costs(portion: &Portion, parts: usize, comm: &dyn Comm) -> Vec<u64> {
     let mut order: Vec<u32> = (0..portion.len() as u32).collect();
     order.sort_by_key(|&at| portion.part[at as usize]);

@@ -129,13 +129,9 @@ fn faces(
             if other != OUTSIDE && (other as usize) > element {
                 count(piece, own[other as usize]);
             } else if other == OUTSIDE && comm.size() > 1 {
-                // Three corners tell which face it is.
-                let mut nodes: Vec<u64> =
-                    portion.elements.face(element, face).iter().map(|&n| portion.nodes[n as usize].into()).collect();
-                nodes.truncate(portion.elements.kind().cell().corners_of_face());
-                nodes.sort_unstable();
-                let at = (nodes[0] + nodes[1] + nodes[2]) % comm.size() as u64;
-                outgoing[at as usize].push([nodes[0] << 32 | nodes[1], nodes[2] << 32 | u64::from(piece)]);
+                let [first, last] = portion.face_key(element, face);
+                let at = (first ^ last) as u32 as usize % comm.size();
+                outgoing[at].push([first, last << 32 | u64::from(piece)]);
             }
         }
     }

@@ -60,6 +60,15 @@ impl Portion {
         }
     }
 
+    /// What identifies a face of an element within the body: three corners.
+    pub fn face_key(&self, element: usize, face: usize) -> [u64; 2] {
+        let corners = self.elements.kind().cell().corners_of_face();
+        let nodes = self.elements.face(element, face);
+        let mut nodes: Vec<u64> = nodes[..corners].iter().map(|&node| self.nodes[node as usize].into()).collect();
+        nodes.sort_unstable();
+        [nodes[0] << 32 | nodes[1], nodes[2]]
+    }
+
     fn none(kind: Kind) -> Self {
         Self {
             numbers: Vec::new(),

@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 
+use super::common::common;
 use super::portion::Portion;
 use super::wholes::Wholes;
 use crate::comm::Comm;
@@ -43,16 +44,12 @@ impl<'a> Sides<'a> {
             dot(area, area)
         };
         let count = faces * portion.len();
-        let key = |face: usize| {
-            // Three corners tell which face it is.
-            let mut nodes: Vec<u64> =
-                nodes(face)[..corners].iter().map(|&node| portion.nodes[node as usize].into()).collect();
-            nodes.sort_unstable();
-            [nodes[0] << 32 | nodes[1], nodes[2]]
-        };
-        let is_open = |face: &usize| comm.size() > 1 && neighbours.behind(face / faces)[face % faces] == OUTSIDE;
-        let open = (0..count).filter(is_open).map(|face| (key(face), face as u32)).collect();
-        let common = common(comm, open);
+        let is_open = |face: &u32| neighbours.behind(*face as usize / faces)[*face as usize % faces] == OUTSIDE;
+        let open: Vec<u32> = (0..count as u32).filter(is_open).collect();
+        let key = |&face: &u32| portion.face_key(face as usize / faces, face as usize % faces);
+        let common = common(comm, &open.iter().map(key).collect::<Vec<_>>());
+        let common =
+            common.into_iter().map(|places| places.into_iter().map(|at| open[at as usize]).collect()).collect();
         Self { comm, faces, weights: (0..count).map(weight).collect(), common, neighbours }
     }
 
@@ -107,36 +104,56 @@ impl<'a> Sides<'a> {
 /// Sums that differ by less are equal.
 const ROUNDING: f64 = 1e-9;
 
-/// Faces that each rank has too, by their keys, in the order of these. Collective.
-fn common(comm: &dyn Comm, mut open: Vec<([u64; 2], u32)>) -> Vec<Vec<u32>> {
-    let ranks = comm.size();
-    let mut outgoing = vec![Vec::new(); ranks];
-    // They meet on the rank that the nodes' numbers point to.
-    for (key, _) in &open {
-        outgoing[((key[0] ^ key[1]) as u32 as usize) % ranks].extend(*key);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::solo::Solo;
+    use crate::comm::threads;
+    use crate::decomposition::{BodyMesh, Shape, number_bodies};
+    use crate::element::Kind;
+    use crate::mesh::Brick;
+
+    const CELLS: [usize; 3] = [6, 5, 3];
+
+    /// A brick whose cells are so high.
+    fn body(kind: Kind, height: f64) -> BodyMesh {
+        let size = [6.0, 5.0, 3.0 * height];
+        let brick = Brick { origin: [0.0; 3], size, cells: CELLS };
+        number_bodies([(kind, Shape::Brick(brick), vec![0])]).swap_remove(0)
     }
-    let mut reports: Vec<([u64; 2], usize)> = Vec::new();
-    for (rank, theirs) in comm.all_to_all(outgoing).iter().enumerate() {
-        reports.extend(theirs.as_chunks::<2>().0.iter().map(|key| (*key, rank)));
+
+    /// What becomes of two parts, the second having these cells.
+    fn flattened(body: &BodyMesh, comm: &dyn Comm, is_second: impl Fn([usize; 3]) -> bool) -> Vec<u32> {
+        let portion = Portion::new(body, None, comm);
+        let place = |&number: &u32| {
+            let cell = (u64::from(number) / body.kind.cell().per_hexahedron()) as usize;
+            u32::from(is_second([cell % CELLS[0], cell / CELLS[0] % CELLS[1], cell / (CELLS[0] * CELLS[1])]))
+        };
+        let mut part: Vec<u32> = portion.numbers.iter().map(place).collect();
+        Sides::new(comm, &portion).flatten(&mut part, &Wholes::new(vec![body.counts().elements], vec![2]));
+        part
     }
-    reports.sort_unstable();
-    let mut answers = vec![Vec::new(); ranks];
-    for same in reports.chunk_by(|a, b| a.0 == b.0) {
-        if let [a, b] = same {
-            answers[a.1].extend([a.0[0], a.0[1], b.1 as u64]);
-            answers[b.1].extend([b.0[0], b.0[1], a.1 as u64]);
+
+    #[test]
+    fn a_cell_goes_to_the_part_around_it_and_plane_faces_stay() {
+        let body = body(Kind::Hex8, 1.0);
+        let plane = |[x, _, _]: [usize; 3]| x >= 3;
+        let with_a_tooth = |cell: [usize; 3]| plane(cell) || cell == [2, 2, 1];
+        let expected = flattened(&body, &Solo, plane);
+        assert_eq!(expected.iter().sum::<u32>(), 45, "half of the cells");
+        assert_eq!(flattened(&body, &Solo, with_a_tooth), expected);
+    }
+
+    #[test]
+    fn ranks_do_not_matter() {
+        for kind in [Kind::Tet4, Kind::Hex8] {
+            let body = body(kind, 0.5);
+            let scattered = |[x, y, z]: [usize; 3]| (x * x + 2 * y + 3 * z) % 5 < 2;
+            let alone = flattened(&body, &Solo, scattered);
+            for ranks in [2, 5] {
+                let found = threads::run(ranks, |comm| flattened(&body, comm, scattered)).concat();
+                assert_eq!(found, alone, "{kind:?}, {ranks} ranks");
+            }
         }
     }
-    open.sort_unstable();
-    let mut found: Vec<(usize, [u64; 2])> = Vec::new();
-    for &[a, b, rank] in comm.all_to_all(answers).iter().flat_map(|theirs| theirs.as_chunks::<3>().0) {
-        found.push((rank as usize, [a, b]));
-    }
-    found.sort_unstable();
-    let mut common = vec![Vec::new(); ranks];
-    for (rank, key) in found {
-        let at = open.partition_point(|face| face.0 < key);
-        common[rank].push(open[at].1);
-    }
-    common
 }

@@ -52,15 +52,11 @@ impl<'a> RowSpace<'a> {
 
     /// The parts of `x'y` that count for each own subdomain, pair by pair.
     pub fn partial(&self, pairs: &[(&[f64], &[f64])]) -> Vec<f64> {
-        let mut partial = vec![0.0; self.owned.len() * pairs.len()];
-        for (rows, sums) in self.owned.iter().zip(partial.chunks_exact_mut(pairs.len().max(1))) {
-            for (pairs, sums) in pairs.chunks(TOGETHER).zip(sums.chunks_mut(TOGETHER)) {
-                if let Ok(pairs) = <&[_; TOGETHER]>::try_from(pairs) {
-                    sums.copy_from_slice(&products(rows, pairs));
-                } else {
-                    pairs.iter().zip(sums).for_each(|(pair, sum)| [*sum] = products(rows, &[*pair]));
-                }
-            }
+        let mut partial = Vec::with_capacity(self.owned.len() * pairs.len());
+        let (groups, others) = pairs.as_chunks::<TOGETHER>();
+        for rows in &self.owned {
+            groups.iter().for_each(|group| partial.extend(products(rows, group)));
+            others.iter().for_each(|pair| partial.extend(products(rows, &[*pair])));
         }
         partial
     }

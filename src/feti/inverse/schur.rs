@@ -65,12 +65,20 @@ impl Split {
 
 /// The numbers of one subdomain.
 struct Values {
-    /// The blocks, in the precision of the factor.
     boundary_block: Numbers,
     coupling: Numbers,
     interior: Option<Factor>,
     /// Whether the interior gives way far more easily somewhere than its unknowns do one by one.
     weak: bool,
+}
+
+impl Values {
+    /// Takes the blocks over, in the precision of the factor if there is one.
+    fn take_blocks(&mut self, split: &Split, stiffness: &[f64]) {
+        let precision = self.interior.as_ref().map_or(Precision::Double, Factor::precision);
+        self.boundary_block.take(split.boundary_block.values(stiffness), precision);
+        self.coupling.take(split.coupling.values(stiffness), precision);
+    }
 }
 
 /// Least pivot, relative to the diagonal entry that it began as, from which an interior is weak. (Ordinary elements have 0.2
@@ -130,12 +138,8 @@ impl Schur {
     pub fn update(&mut self, own: usize, subdomain: usize, stiffness: &[f64], common: bool) -> Result<(), NotDefinite> {
         let split = &*self.splits[own];
         let values = self.values.renew(own, common && self.together[own], || split.values(self.precision));
-        let take = |precision, values: &mut Values| {
-            values.boundary_block.take(split.boundary_block.values(stiffness), precision);
-            values.coupling.take(split.coupling.values(stiffness), precision);
-        };
         let (Some(interior), Some(factor)) = (&split.interior, &mut values.interior) else {
-            take(Precision::Double, values);
+            values.take_blocks(split, stiffness);
             return Ok(());
         };
         if let Some(precision) = self.precision.filter(|&precision| factor.precision() != precision) {
@@ -152,7 +156,7 @@ impl Schur {
             *factor = interior.factor(Precision::Double);
             outcome = factorise(factor);
         }
-        take(factor.precision(), values);
+        values.take_blocks(split, stiffness);
         outcome.map_err(|breakdown| NotDefinite { subdomain, pivot: breakdown.place, dofs: interior.unknowns.len() })
     }
 
@@ -166,11 +170,14 @@ impl Schur {
         self.splits[own].interior.as_ref().map_or(0.0, |interior| interior.cholesky.flops())
     }
 
-    /// Bytes of matrices that one [`Schur::apply`] reads: the factor twice, so the coupling, the boundary block once.
+    /// Bytes of matrices that one [`Schur::apply`] reads: the factor twice, so the coupling, the boundary block once; blocks with
+    /// their indices.
     pub fn bytes_per_apply(&self) -> f64 {
         self.values.sum(|values| {
             let Values { boundary_block, coupling, interior, .. } = values;
-            (2 * interior.as_ref().map_or(0, Factor::bytes) + boundary_block.bytes() + 2 * coupling.bytes()) as f64
+            let with_indices = |block: &Numbers| block.bytes() + size_of::<u32>() * block.len();
+            let factor = interior.as_ref().map_or(0, Factor::bytes);
+            (2 * factor + with_indices(boundary_block) + 2 * with_indices(coupling)) as f64
         })
     }
 
