@@ -12,10 +12,10 @@ use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::feti::dual::Interconnection;
+use crate::feti::dual::hybrid::Hybrid;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::{Factors, analyse};
-use crate::feti::inverse::hybrid::Hybrid;
 use crate::feti::inverse::tangents::Linearisation;
 use crate::material::Material;
 use crate::model;
@@ -184,13 +184,13 @@ impl<'a> Setup<'a> {
         &self.discrete.materials[self.subdomains()[own].material]
     }
 
-    pub fn coarse(&self) -> Result<Coarse<'a>, Floating> {
+    pub fn coarse(&self) -> Result<Coarse<'_>, Floating> {
         let mut coarse = self.bare_coarse();
         coarse.factorise().map(|()| coarse)
     }
 
     /// Without a factor.
-    pub fn bare_coarse(&self) -> Coarse<'a> {
+    pub fn bare_coarse(&self) -> Coarse<'_> {
         let Discrete { decomposition, constraints, .. } = &self.discrete;
         Coarse::new(self.comm, decomposition, constraints, &self.connection)
     }
@@ -209,13 +209,12 @@ impl<'a> Setup<'a> {
 
     /// `F` of the elastic bodies.
     pub fn operator(&self) -> DualOperator<'_> {
-        let clusters = &self.discrete.decomposition.clusters;
-        let hybrid =
-            (!clusters.are_single()).then(|| Hybrid::new(clusters.of_rank(self.comm.rank()), self.subdomains()));
+        let Discrete { decomposition, constraints, .. } = &self.discrete;
+        let hybrid = Hybrid::of_clusters(&self.connection, decomposition, constraints).expect("clusters are firm");
         let (count, timer) = (self.subdomains().len(), Timer::start());
         let symbolic = analyse(self.subdomains());
-        let inverse = Inverse::new(symbolic, Precision::Double, hybrid, vec![None; count], vec![Vec::new(); count]);
-        let mut operator = DualOperator::new(inverse, &self.gather);
+        let inverse = Inverse::new(symbolic, Precision::Double, vec![None; count], vec![Vec::new(); count]);
+        let mut operator = DualOperator::new(inverse, hybrid, &self.gather);
         let region =
             |subdomain| Region { subdomain, material: &self.discrete.materials[subdomain.material], history: &[] };
         let regions: Vec<Region> = self.subdomains().iter().map(region).collect();
@@ -270,7 +269,7 @@ impl<'a> Setup<'a> {
         let clusters = &self.discrete.decomposition.clusters;
         let mut r = Mat::zeros(total, 6 * clusters.total());
         let mut row = 0;
-        for (subdomain, modes) in self.subdomains().iter().zip(&self.modes) {
+        for (subdomain, modes) in self.subdomains().iter().zip(self.modes()) {
             for components in subdomain.points.iter().flat_map(|&point| modes.at(point)) {
                 (0..6).for_each(|k| r[(row, 6 * clusters.of(subdomain.id) + k)] = components[k]);
                 row += 1;

@@ -284,7 +284,7 @@ fn pressure_all_round_is_the_force_of_hydrostatic_stress_and_has_no_resultant() 
         let mut internal = vec![0.0; subdomain.dofs()];
         internal::add_forces(&Region::virgin(subdomain, &material), &u, &mut internal);
         assert_close(&column(&forces), &column(&internal), 1e-12);
-        let resultants = setup.modes[0].resultants(&subdomain.points, &forces);
+        let resultants = setup.modes()[0].resultants(&subdomain.points, &forces);
         assert!(size(&resultants) < 1e-12 * size(&forces), "{resultants:?}");
     });
 }

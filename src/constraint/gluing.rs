@@ -1,8 +1,8 @@
 //! Gluing rows: the copies of a node move together.
 //!
 //! Per component the rows are an orthonormal basis of the complement of the constant over the copies (Helmert's): row `k`
-//! compares copy `k` with the mean of those before it. Copies in one cluster are compared among themselves, and the mean of each
-//! cluster with that of the clusters before it: only these rows move whole clusters against each other. The stiffest come first.
+//! compares copy `k` with the mean of those before it. Copies in one group are compared among themselves, and the mean of each
+//! group with that of the groups before it: only these rows move whole groups against each other. The stiffest come first.
 
 use super::{Kind, Row, Term};
 use crate::decomposition::{Clusters, InterfaceNode};
@@ -11,26 +11,34 @@ use crate::decomposition::{Clusters, InterfaceNode};
 pub(super) fn rows(node: &InterfaceNode, clusters: &Clusters, stiffness: &[f64]) -> Vec<Row> {
     let mut copies = node.copies.clone();
     copies.sort_by(|&a, &b| stiffness[b as usize].total_cmp(&stiffness[a as usize]));
-    let of = |copy: u32| clusters.of(copy as usize);
-    let stiffest: Vec<usize> = copies.iter().map(|&copy| of(copy)).collect();
-    copies.sort_by_key(|&copy| stiffest.iter().position(|&cluster| cluster == of(copy)));
-    let mut rows = Vec::new();
-    for axis in 0..3 {
-        let mut before = 0;
-        for group in copies.chunk_by(|&a, &b| of(a) == of(b)) {
-            let end = before + group.len();
-            if before > 0 {
-                rows.push(compare(node.node, axis, &copies[..before], &copies[before..end]));
-            }
-            rows.extend((1..group.len()).map(|k| compare(node.node, axis, &group[..k], &group[k..k + 1])));
-            before = end;
-        }
+    for level in 1..=clusters.levels() {
+        let of = |copy: &u32| clusters.group(level, *copy as usize);
+        let stiffest: Vec<usize> = copies.iter().map(of).collect();
+        copies.sort_by_key(|copy| stiffest.iter().position(|group| *group == of(copy)));
     }
+    let mut rows = Vec::new();
+    (0..3).for_each(|axis| compare_within(clusters, clusters.levels(), (node.node, axis), &copies, &mut rows));
     rows
 }
 
+/// The rows of copies in one group of the level above `level`, of which those of one group of a level are side by side.
+fn compare_within(clusters: &Clusters, level: usize, at: (u64, usize), copies: &[u32], rows: &mut Vec<Row>) {
+    let of = |copy: u32| clusters.group(level, copy as usize);
+    let mut before = 0;
+    for group in copies.chunk_by(|&a, &b| of(a) == of(b)) {
+        let end = before + group.len();
+        if before > 0 {
+            rows.push(compare(at, &copies[..before], &copies[before..end]));
+        }
+        if level > 0 {
+            compare_within(clusters, level - 1, at, group, rows);
+        }
+        before = end;
+    }
+}
+
 /// The mean of some copies against that of others.
-fn compare(node: u64, axis: usize, first: &[u32], second: &[u32]) -> Row {
+fn compare((node, axis): (u64, usize), first: &[u32], second: &[u32]) -> Row {
     let (p, q) = (first.len(), second.len());
     let unit = 1.0 / ((p * q * (p + q)) as f64).sqrt();
     let before = first.iter().map(|&subdomain| Term { subdomain, node, axis, value: q as f64 * unit });
@@ -42,13 +50,13 @@ fn compare(node: u64, axis: usize, first: &[u32], second: &[u32]) -> Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::Shares;
 
     #[test]
     fn rows_are_orthonormal_and_few_of_them_leave_a_cluster() {
         let node = InterfaceNode { node: 7, copies: vec![0, 1, 2, 5, 6, 8], surfaces: Vec::new() };
-        let (clusters, _) = Clusters::new(Shares(vec![3]), &[3, 4, 2]);
-        for (clusters, leaving) in [(Clusters::new(Shares(vec![9]), &[1; 9]).0, 15), (clusters, 6)] {
+        let [single, clusters, nested] =
+            [&[][..], &[vec![3, 4, 2]], &[vec![3, 4, 2], vec![2, 1]]].map(|sizes| Clusters::new(9, sizes));
+        for (clusters, leaving) in [(single, 15), (clusters, 6), (nested, 3)] {
             let rows = rows(&node, &clusters, &[1.0, 4.0, 1.0, 1.0, 1.0, 2.0, 8.0, 1.0, 1.0]);
             assert_eq!(rows.len(), 15);
             for (i, a) in rows.iter().enumerate() {

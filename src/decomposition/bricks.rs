@@ -1,6 +1,8 @@
 //! Cutting brick bodies into boxes of cells, each rank generating only its own.
 
-use super::shares::{by_cost, interleave};
+use std::ops::Range;
+
+use super::shares::{interleave, whole_groups};
 use super::{BodyMesh, Clusters, ElementList};
 use crate::comm::{Comm, Shares};
 use crate::mesh::Brick;
@@ -11,28 +13,29 @@ struct Boxes<'a> {
     cells: [usize; 3],
     /// Body and number within it, x fastest, of each box.
     order: Vec<(usize, usize)>,
-    /// Number of boxes in each cluster.
-    clusters: Vec<usize>,
+    clusters: Clusters,
 }
 
 impl<'a> Boxes<'a> {
-    /// Boxes of so many cells in clusters of about so many; all bodies are bricks, and the cells divide theirs. `yielding`
-    /// says of each body's boxes whether they are expected to yield, which makes them dearer in every phase: a part of the
-    /// order has its part of clusters with and without such.
-    fn new(bodies: &'a [BodyMesh], cells: [usize; 3], cluster: usize, yielding: Option<&[Vec<bool>]>) -> Self {
+    /// Boxes of so many cells in groups of about so many on each level; all bodies are bricks, and the cells divide theirs.
+    /// `yielding` says of each body's boxes whether they are expected to yield, which makes them dearer in every phase: a part of
+    /// the order has its part of clusters with and without such.
+    fn new(bodies: &'a [BodyMesh], cells: [usize; 3], groups: &[usize], yielding: Option<&[Vec<bool>]>) -> Self {
         let mut lists = Vec::new();
         for (body, mesh) in bodies.iter().enumerate() {
-            let yields = |boxes: &Vec<usize>| yielding.is_some_and(|yielding| boxes.iter().any(|&k| yielding[body][k]));
-            let (dear, cheap): (Vec<_>, Vec<_>) = blocks(along(mesh, cells), cluster).into_iter().partition(yields);
+            let yields =
+                |block: &Block| yielding.is_some_and(|yielding| block.boxes.iter().any(|&k| yielding[body][k]));
+            let (dear, cheap): (Vec<_>, Vec<_>) = blocks(along(mesh, cells), groups).into_iter().partition(yields);
             lists.extend([(body, cheap), (body, dear)]);
         }
         let lengths: Vec<usize> = lists.iter().map(|list| list.1.len()).collect();
-        let (mut order, mut clusters) = (Vec::new(), Vec::new());
+        let (mut order, mut sizes) = (Vec::new(), vec![Vec::new(); groups.len()]);
         for (list, k) in interleave(&lengths) {
             let (body, list) = &lists[list];
-            clusters.push(list[k].len());
-            order.extend(list[k].iter().map(|&number| (*body, number)));
+            order.extend(list[k].boxes.iter().map(|&number| (*body, number)));
+            sizes.iter_mut().zip(&list[k].sizes).for_each(|(all, sizes)| all.extend(sizes));
         }
+        let clusters = Clusters::new(order.len(), &sizes);
         Self { bodies, cells, order, clusters }
     }
 
@@ -90,56 +93,92 @@ pub(crate) fn parts(counts: [usize; 3], cluster: usize) -> [usize; 3] {
     parts
 }
 
-/// The boxes of each block, as their numbers, ascending; blocks are as equal as can be.
-fn blocks(counts: [usize; 3], cluster: usize) -> Vec<Vec<usize>> {
-    let parts = parts(counts, cluster);
-    let range = |a: usize, part: usize| part * counts[a] / parts[a]..(part + 1) * counts[a] / parts[a];
-    let mut blocks = Vec::new();
-    for z in 0..parts[2] {
-        for y in 0..parts[1] {
-            for x in 0..parts[0] {
-                let rows = range(2, z).flat_map(|k| range(1, y).map(move |j| counts[0] * (j + counts[1] * k)));
-                blocks.push(rows.flat_map(|row| range(0, x).map(move |i| i + row)).collect());
-            }
-        }
+/// Neighbouring boxes, in groups.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Block {
+    /// Numbers of the boxes.
+    boxes: Vec<usize>,
+    /// For each level the sizes of its groups, in groups of the level below.
+    sizes: Vec<Vec<usize>>,
+}
+
+/// The blocks of the highest level; groups of one level are as equal as can be.
+fn blocks(counts: [usize; 3], groups: &[usize]) -> Vec<Block> {
+    let mut grids = vec![counts];
+    groups.iter().for_each(|&size| grids.push(parts(grids[grids.len() - 1], size)));
+    let block = |place: [usize; 3]| {
+        let mut block = Block { boxes: Vec::new(), sizes: vec![Vec::new(); groups.len()] };
+        block.fill(&grids, place);
+        block
+    };
+    places(grids[groups.len()].map(|n| 0..n)).map(block).collect()
+}
+
+/// Places in a grid, x fastest.
+fn places([x, y, z]: [Range<usize>; 3]) -> impl Iterator<Item = [usize; 3]> {
+    z.flat_map(move |k| {
+        let x = x.clone();
+        y.clone().flat_map(move |j| x.clone().map(move |i| [i, j, k]))
+    })
+}
+
+impl Block {
+    /// Adds the group at a place of the last grid.
+    fn fill(&mut self, grids: &[[usize; 3]], place: [usize; 3]) {
+        let [.., finer, coarser] = grids else {
+            let [nx, ny, _] = grids[0];
+            return self.boxes.push(place[0] + nx * (place[1] + ny * place[2]));
+        };
+        let range = |a: usize| place[a] * finer[a] / coarser[a]..(place[a] + 1) * finer[a] / coarser[a];
+        let children = [range(0), range(1), range(2)];
+        self.sizes[grids.len() - 2].push(children.iter().map(Range::len).product());
+        places(children).for_each(|place| self.fill(&grids[..grids.len() - 1], place));
     }
-    blocks
 }
 
 /// Returns the clusters, the shares and this rank's element lists, about as many boxes for every rank; see [`Boxes::new`].
 pub(crate) fn own_elements(
     bodies: &[BodyMesh],
     cells: [usize; 3],
-    cluster: usize,
+    groups: &[usize],
     yielding: Option<&[Vec<bool>]>,
     comm: &dyn Comm,
 ) -> (Clusters, Shares, Vec<ElementList>) {
-    let boxes = Boxes::new(bodies, cells, cluster, yielding);
-    let costs: Vec<u64> = boxes.clusters.iter().map(|&size| size as u64).collect();
-    let (clusters, shares) = Clusters::new(by_cost(&costs, comm.size()), &boxes.clusters);
+    let boxes = Boxes::new(bodies, cells, groups, yielding);
+    let shares = whole_groups(&boxes.clusters, |_| 1, comm.size());
     let first = shares.begin(comm.rank());
     let lists = (first..first + shares.0[comm.rank()]).map(|number| boxes.elements(number)).collect();
-    (clusters, shares, lists)
+    (boxes.clusters, shares, lists)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::blocks;
+    use super::{Block, blocks};
+
+    fn boxes(counts: [usize; 3], groups: &[usize]) -> Vec<Vec<usize>> {
+        blocks(counts, groups).into_iter().map(|block| block.boxes).collect()
+    }
 
     #[test]
     fn blocks_fill_the_body_with_parts_as_equal_as_can_be() {
-        assert_eq!(blocks([3, 2, 1], 1), [[0], [1], [2], [3], [4], [5]]);
+        assert_eq!(boxes([3, 2, 1], &[]), [[0], [1], [2], [3], [4], [5]]);
         assert_eq!(
-            blocks([5, 2, 2], 12),
+            boxes([5, 2, 2], &[12]),
             [vec![0, 1, 5, 6, 10, 11, 15, 16], vec![2, 3, 4, 7, 8, 9, 12, 13, 14, 17, 18, 19]]
         );
-        assert_eq!(blocks([45, 15, 15], 27).len(), 15 * 5 * 5);
-        assert_eq!(blocks([2, 1, 1], 2), [[0, 1]]);
-        assert_eq!(blocks([12, 6, 1], 9).len(), 8);
-        for cluster in [1, 8, 20, 27, 1000] {
-            let mut all = blocks([7, 5, 3], cluster).concat();
+        assert_eq!(boxes([45, 15, 15], &[27]).len(), 15 * 5 * 5);
+        assert_eq!(boxes([2, 1, 1], &[2]), [[0, 1]]);
+        assert_eq!(boxes([12, 6, 1], &[9]).len(), 8);
+        for groups in [&[][..], &[1], &[8], &[20], &[27, 8], &[1000], &[2, 2, 2]] {
+            let mut all = boxes([7, 5, 3], groups).concat();
             all.sort_unstable();
-            assert!(all.into_iter().eq(0..105), "{cluster}");
+            assert!(all.into_iter().eq(0..105), "{groups:?}");
         }
+    }
+
+    #[test]
+    fn blocks_of_blocks_are_nested() {
+        let block = |boxes: [usize; 4]| Block { boxes: boxes.to_vec(), sizes: vec![vec![2, 2], vec![2]] };
+        assert_eq!(blocks([4, 2, 1], &[2, 2]), [block([0, 4, 1, 5]), block([2, 6, 3, 7])]);
     }
 }

@@ -1,59 +1,84 @@
-//! Groups of neighbouring subdomains of one body that share one set of six rigid motions in the coarse problem.
+//! Groups of neighbouring subdomains of one body, and groups of such groups: the levels of the coarse problem.
 //!
-//! As subdomains they belong to the scene: consecutive numbers, whole on one rank, the same on any number of ranks.
+//! Level 0 are the subdomains. The groups of the highest level are the *clusters*: each has one set of six rigid motions in the
+//! coarse problem. As subdomains groups belong to the scene: consecutive numbers, the same on any number of ranks. Ranks may
+//! share a group.
 
 use std::ops::Range;
 
-use crate::comm::Shares;
-
-/// The clusters of all ranks.
+/// The groups of all levels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Clusters {
-    /// Clusters owned by each rank.
-    pub shares: Shares,
-    /// The first subdomain of each cluster, and the end.
-    begins: Vec<usize>,
+    /// For each level above the subdomains the first subdomain of each group, and the end.
+    begins: Vec<Vec<usize>>,
+    subdomains: usize,
 }
 
 impl Clusters {
-    /// Of so many subdomains each, spread over the ranks as `shares` say; also the shares of the subdomains.
-    pub fn new(shares: Shares, sizes: &[usize]) -> (Self, Shares) {
-        let mut begins = vec![0];
-        sizes.iter().for_each(|size| begins.push(begins[begins.len() - 1] + size));
-        let mut first = 0;
-        let subdomains = shares.0.iter().map(|count| {
-            let of_rank = begins[first + count] - begins[first];
-            first += count;
-            of_rank
-        });
-        let subdomains = Shares(subdomains.collect());
-        (Self { shares, begins }, subdomains)
+    /// From the sizes of the groups of each level, counted in groups of the level below.
+    pub fn new(subdomains: usize, sizes: &[Vec<usize>]) -> Self {
+        let mut begins: Vec<Vec<usize>> = Vec::new();
+        for sizes in sizes {
+            let mut ends = vec![0];
+            sizes.iter().for_each(|size| ends.push(ends[ends.len() - 1] + size));
+            let first = |child: &usize| begins.last().map_or(*child, |below| below[*child]);
+            begins.push(ends.iter().map(first).collect());
+        }
+        debug_assert!(begins.iter().all(|begins| begins.last() == Some(&subdomains)), "groups cover all subdomains");
+        Self { begins, subdomains }
+    }
+
+    /// Levels above the subdomains; none in plain Total FETI.
+    pub fn levels(&self) -> usize {
+        self.begins.len()
+    }
+
+    /// Number of groups of a level.
+    pub fn count(&self, level: usize) -> usize {
+        level.checked_sub(1).map_or(self.subdomains, |level| self.begins[level].len() - 1)
+    }
+
+    /// The group of a subdomain on a level.
+    pub fn group(&self, level: usize, subdomain: usize) -> usize {
+        level.checked_sub(1).map_or(subdomain, |at| self.begins[at].partition_point(|&begin| begin <= subdomain) - 1)
+    }
+
+    /// The first subdomain of a group; that behind all for the number of groups.
+    pub fn begin(&self, level: usize, group: usize) -> usize {
+        level.checked_sub(1).map_or(group, |level| self.begins[level][group])
+    }
+
+    /// The groups of a level whose first subdomains are among these.
+    pub fn beginning(&self, level: usize, subdomains: Range<usize>) -> Range<usize> {
+        let Some(at) = level.checked_sub(1) else { return subdomains };
+        let begins = &self.begins[at][..self.count(level)];
+        begins.partition_point(|&begin| begin < subdomains.start)
+            ..begins.partition_point(|&begin| begin < subdomains.end)
+    }
+
+    /// Groups of the level below that a group consists of.
+    pub fn children(&self, level: usize, group: usize) -> Range<usize> {
+        self.beginning(level - 1, self.begin(level, group)..self.begin(level, group + 1))
     }
 
     /// Number of clusters.
     pub fn total(&self) -> usize {
-        self.begins.len() - 1
+        self.count(self.levels())
     }
 
     /// Whether each subdomain is a cluster of its own: plain Total FETI.
     pub fn are_single(&self) -> bool {
-        self.begins.last() == Some(&self.total())
+        self.begins.is_empty()
     }
 
     /// The cluster of a subdomain.
     pub fn of(&self, subdomain: usize) -> usize {
-        self.begins.partition_point(|&begin| begin <= subdomain) - 1
+        self.group(self.levels(), subdomain)
     }
 
     /// The first subdomain of a cluster.
     pub fn first(&self, cluster: usize) -> usize {
-        self.begins[cluster]
-    }
-
-    /// The clusters of a rank, as ranges of its own subdomains.
-    pub fn of_rank(&self, rank: usize) -> impl Iterator<Item = Range<usize>> + Clone + '_ {
-        let clusters = &self.begins[self.shares.begin(rank)..=self.shares.begin(rank) + self.shares.0[rank]];
-        clusters.windows(2).map(|pair| pair[0] - clusters[0]..pair[1] - clusters[0])
+        self.begin(self.levels(), cluster)
     }
 }
 
@@ -62,16 +87,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clusters_are_consecutive_and_whole_on_a_rank() {
-        let (clusters, subdomains) = Clusters::new(Shares(vec![2, 0, 1]), &[3, 2, 4]);
-        assert_eq!(subdomains.0, [5, 0, 4]);
-        assert_eq!((0..9).map(|s| clusters.of(s)).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 2, 2, 2, 2]);
-        assert_eq!((0..3).map(|c| clusters.first(c)).collect::<Vec<_>>(), [0, 3, 5]);
-        let of_ranks = (0..3).flat_map(|rank| clusters.of_rank(rank).map(move |members| (rank, members)));
-        assert!(of_ranks.eq([(0, 0..3), (0, 3..5), (2, 0..4)]));
-        assert!(!clusters.are_single());
-        let (singles, subdomains) = Clusters::new(Shares(vec![1, 2]), &[1; 3]);
-        assert!(singles.are_single() && singles.total() == 3 && singles.of(2) == 2);
-        assert_eq!(subdomains.0, [1, 2]);
+    fn groups_are_consecutive_and_nested() {
+        let clusters = Clusters::new(9, &[vec![3, 2, 1, 3], vec![3, 1]]);
+        assert_eq!([0, 1, 2].map(|level| clusters.count(level)), [9, 4, 2]);
+        assert_eq!((0..9).map(|s| clusters.group(1, s)).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 2, 3, 3, 3]);
+        assert_eq!((0..9).map(|s| clusters.of(s)).collect::<Vec<_>>(), [0, 0, 0, 0, 0, 0, 1, 1, 1]);
+        assert_eq!((0..3).map(|group| clusters.begin(2, group)).collect::<Vec<_>>(), [0, 6, 9]);
+        assert_eq!((clusters.first(1), clusters.levels(), clusters.total()), (6, 2, 2));
+        assert_eq!((clusters.children(2, 0), clusters.children(2, 1), clusters.children(1, 1)), (0..3, 3..4, 3..5));
+        assert_eq!(
+            (clusters.beginning(1, 1..6), clusters.beginning(2, 1..6), clusters.beginning(0, 1..6)),
+            (1..3, 1..1, 1..6)
+        );
+        let singles = Clusters::new(3, &[]);
+        assert!(singles.are_single() && singles.total() == 3 && singles.of(2) == 2 && singles.first(2) == 2);
     }
 }

@@ -26,11 +26,38 @@ const DEAR: f64 = 52.0;
 /// Numbers that could be read in the time that each subdomain takes besides.
 const OVERHEAD: f64 = 500.0;
 
+/// The coarse problem has at most about so many clusters: more are grouped again.
+pub const TOP: usize = 1500;
+
+/// Sizes of the groups of each level for so many subdomains of so many linear tetrahedra in all.
+pub fn groups(subdomains: usize, tetrahedra: u64) -> Vec<usize> {
+    let mut groups = levels(subdomains, cluster(subdomains, tetrahedra));
+    let mut count = groups.iter().fold(subdomains, |count, size| count.div_ceil(*size));
+    while count > TOP {
+        let size = if count <= 8 * TOP { 8 } else { 27 };
+        groups.push(size);
+        count = count.div_ceil(size);
+    }
+    groups
+}
+
+/// Sizes of the groups of each level if they are equal: as many levels as the coarse problem needs, one at least. Nothing if the
+/// size is one.
+pub fn levels(subdomains: usize, size: usize) -> Vec<usize> {
+    let mut groups = Vec::new();
+    let mut count = subdomains;
+    while size > 1 && (groups.is_empty() || count > TOP) {
+        groups.push(size);
+        count = count.div_ceil(size);
+    }
+    groups
+}
+
 /// Subdomains in a cluster, of so many linear tetrahedra in all: blocks of one, two or three along each edge. Larger ones
 /// leave a smaller coarse problem, make K^+ dearer and take more iterations: they pay where the coarse problem takes about
 /// twice the time of F, by the counts of numbers above. Constants are from the benchmark in 48 to 20,250 boxes of 2, 4, 5 and
 /// 10 cells an edge.
-pub fn cluster(subdomains: usize, tetrahedra: u64) -> usize {
+fn cluster(subdomains: usize, tetrahedra: u64) -> usize {
     let count = subdomains as f64;
     let nodes = ((tetrahedra as f64 / (6.0 * count)).cbrt() + 1.0).powi(3);
     let local = count * ((3.0 * nodes).powf(4.0 / 3.0) + OVERHEAD);

@@ -193,26 +193,25 @@ pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape, Vec<usize>)>
         .collect()
 }
 
-/// Tears the bodies into subdomains and these into clusters of about `cluster` (see [`cost::cluster`] if nothing is said).
-/// `yielding` says which boxes of [`Cut::Bricks`] of each body, x fastest, are expected to yield: every rank gets its part of
+/// Tears the bodies into subdomains, in groups of about so many on each level, which `groups` tells of the number of
+/// subdomains. `yielding` says which boxes of [`Cut::Bricks`] of each body, x fastest, are expected to yield: every rank gets its part of
 /// them. Collective.
 pub fn tear(
     bodies: &Bodies,
     cut: Cut,
-    cluster: Option<usize>,
+    groups: &dyn Fn(usize) -> Vec<usize>,
     yielding: Option<&[Vec<bool>]>,
     comm: &dyn Comm,
 ) -> Decomposition {
-    let cluster = |subdomains| cluster.unwrap_or_else(|| cost::cluster(subdomains, tetrahedra(bodies.bodies)));
     let (clusters, shares, subdomains) = match cut {
         Cut::Bricks(cells) => {
-            let cluster = cluster(bodies.bodies.iter().map(|body| bricks::count(body, cells)).sum());
-            let (clusters, shares, lists) = bricks::own_elements(bodies.bodies, cells, cluster, yielding, comm);
+            let groups = groups(bodies.bodies.iter().map(|body| bricks::count(body, cells)).sum());
+            let (clusters, shares, lists) = bricks::own_elements(bodies.bodies, cells, &groups, yielding, comm);
             let ids = shares.begin(comm.rank())..;
             let of_brick = |(id, (body, list)): (usize, ElementList)| Subdomain::of_brick(id, bodies, body, &list);
             (clusters, shares, ids.zip(lists).map(of_brick).collect())
         }
-        Cut::Parts(parts) => parts::own_subdomains(bodies, parts, cluster(parts), comm),
+        Cut::Parts(parts) => parts::own_subdomains(bodies, parts, &groups(parts), comm),
     };
     let interface = interface::share(comm, &subdomains);
     Decomposition { shares, clusters, subdomains, interface }

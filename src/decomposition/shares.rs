@@ -1,6 +1,26 @@
 //! How many subdomains each rank gets.
 
+use super::Clusters;
 use crate::comm::Shares;
+
+/// So many groups of the lowest level for each rank keep ranks equal to a few per cent.
+const MANY: usize = 16;
+
+/// Consecutive blocks of subdomains with costs as equal as can be: whole groups of the lowest level where there are many, as ranks
+/// that share one send messages for it.
+pub fn whole_groups(clusters: &Clusters, cost: impl Fn(usize) -> u64, ranks: usize) -> Shares {
+    let level = usize::from(clusters.levels() > 0 && clusters.count(1) >= MANY * ranks);
+    let members = |group: usize| clusters.begin(level, group)..clusters.begin(level, group + 1);
+    let costs: Vec<u64> = (0..clusters.count(level)).map(|group| members(group).map(&cost).sum()).collect();
+    let groups = by_cost(&costs, ranks);
+    let mut first = 0;
+    let subdomains = groups.0.iter().map(|count| {
+        let begin = clusters.begin(level, first);
+        first += count;
+        clusters.begin(level, first) - begin
+    });
+    Shares(subdomains.collect())
+}
 
 /// Consecutive blocks of items over `ranks`, their costs as equal as a walk along the items makes them. Every rank has
 /// an item as long as there are enough.
@@ -43,6 +63,14 @@ pub fn interleave(lengths: &[usize]) -> Vec<(usize, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn many_groups_stay_whole_and_few_do_not() {
+        let clusters = Clusters::new(99, &[vec![3; 33]]);
+        assert_eq!(whole_groups(&clusters, |_| 1, 2).0, [51, 48]);
+        assert_eq!(whole_groups(&clusters, |_| 1, 3).0, [33, 33, 33]);
+        assert_eq!(whole_groups(&clusters, |_| 1, 5).0, [20, 20, 20, 20, 19]);
+    }
 
     #[test]
     fn equal_items_are_spread_evenly_and_ranks_beyond_them_stay_idle() {

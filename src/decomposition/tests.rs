@@ -216,7 +216,7 @@ fn a_body_of_several_pieces_is_cut_piece_by_piece() {
     let meshes = BTreeMap::from([(0, mesh)]);
     for parts in [1, 3, 12] {
         let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[] };
-        let subdomains = tear(&torn, Cut::Parts(parts), None, None, &Solo).subdomains;
+        let subdomains = tear(&torn, Cut::Parts(parts), &|_| Vec::new(), None, &Solo).subdomains;
         assert!(subdomains.len() >= parts.max(3));
         assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
         subdomains.iter().for_each(assert_hangs_together);
@@ -231,7 +231,7 @@ fn thin_plates_and_bodies_of_few_elements_are_cut() {
         let brick = Brick { origin: [0.0; 3], size, cells };
         let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick), vec![0])]);
         let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
-        let subdomains = tear(&torn, Cut::Parts(parts), Some(1), None, &Solo).subdomains;
+        let subdomains = tear(&torn, Cut::Parts(parts), &|_| Vec::new(), None, &Solo).subdomains;
         subdomains.iter().for_each(assert_hangs_together);
         let elements = brick.element_count() as usize;
         assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
@@ -256,7 +256,7 @@ fn regions_are_cut_one_by_one_by_their_size() {
         let subdomains = threads::run(ranks, |comm| {
             let meshes = if comm.rank() == 0 { meshes.clone() } else { BTreeMap::new() };
             let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[] };
-            tear(&torn, Cut::Parts(parts), None, None, comm).subdomains
+            tear(&torn, Cut::Parts(parts), &|_| Vec::new(), None, comm).subdomains
         });
         subdomains.concat()
     };
@@ -290,7 +290,7 @@ fn boxes_that_yield_are_spread_over_the_ranks() {
     let cut = |expected: Option<&[Vec<bool>]>, ranks: usize| {
         threads::run(ranks, |comm| {
             let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
-            let own = tear(&torn, Cut::Bricks([2, 2, 2]), None, expected, comm).subdomains;
+            let own = tear(&torn, Cut::Bricks([2, 2, 2]), &|_| Vec::new(), expected, comm).subdomains;
             own.iter().map(|s| (s.body, s.nodes.clone())).collect::<Vec<_>>()
         })
     };
@@ -318,11 +318,11 @@ fn clusters_hang_together_and_are_the_same_on_any_ranks() {
     let metis = ["decomposition.subdomains=24", "decomposition.cluster=4"];
     for (scene, wanted) in [(two_bricks(&bricks), 4), (two_bricks(&metis), 6)] {
         let clusters = |ranks: usize| -> Vec<Vec<Subdomain>> {
-            let of_rank = |setup: &Setup| {
-                let clusters = setup.discrete.decomposition.clusters.of_rank(setup.comm.rank());
-                clusters.map(|members| setup.subdomains()[members].to_vec()).collect::<Vec<_>>()
-            };
-            on_ranks(&scene, ranks, of_rank).concat()
+            let of_rank = |setup: &Setup| (setup.discrete.decomposition.clusters.clone(), setup.subdomains().to_vec());
+            let (clusters, subdomains): (Vec<_>, Vec<_>) = on_ranks(&scene, ranks, of_rank).into_iter().unzip();
+            let (clusters, subdomains) = (&clusters[0], subdomains.concat());
+            let members = |cluster| clusters.first(cluster)..clusters.first(cluster + 1);
+            (0..clusters.total()).map(|cluster| subdomains[members(cluster)].to_vec()).collect()
         };
         let alone = clusters(1);
         assert_eq!(alone.len(), wanted, "{:?}", scene.decomposition);

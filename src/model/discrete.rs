@@ -14,7 +14,7 @@ use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Su
 use crate::material::{Law, Material};
 use crate::mesh::Face;
 use crate::monitor::timing::peak_rss_mb;
-use crate::scene::{self, Scene, SurfaceName};
+use crate::scene::{self, Groups, Scene, SurfaceName};
 
 /// One rank's part of the discrete problem.
 pub struct Discrete {
@@ -70,7 +70,8 @@ pub fn discretise_expecting(
     let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &named.surfaces };
     let cut = cut(&scene.decomposition.method, &bodies);
     can_be_cut(scene, &bodies, cut)?;
-    let decomposition = decomposition::tear(&torn, cut, scene.decomposition.cluster, yielding, comm);
+    let tetrahedra = decomposition::tetrahedra(&bodies);
+    let decomposition = decomposition::tear(&torn, cut, &|count| groups(scene, count, tetrahedra), yielding, comm);
     drop(solids);
     let reading_mb = reading_mb(&bodies, comm);
 
@@ -184,6 +185,15 @@ pub fn cut(wanted: &scene::Method, bodies: &[BodyMesh]) -> Cut {
         scene::Method::Bricks { cells } => Cut::Bricks(cells),
         scene::Method::Metis { subdomains } => Cut::Parts(subdomains.unwrap_or_else(best)),
         scene::Method::Auto => boxes(bodies, best()).map_or_else(|| Cut::Parts(best()), Cut::Bricks),
+    }
+}
+
+/// Sizes of the groups of each level, for so many subdomains of so many linear tetrahedra.
+pub fn groups(scene: &Scene, subdomains: usize, tetrahedra: u64) -> Vec<usize> {
+    match &scene.decomposition.cluster {
+        None => cost::groups(subdomains, tetrahedra),
+        Some(Groups::Equal(size)) => cost::levels(subdomains, *size),
+        Some(Groups::Levels(sizes)) => sizes.clone(),
     }
 }
 

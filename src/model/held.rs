@@ -21,7 +21,7 @@ pub fn held(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Result<(), M
     let connection = Interconnection::new(comm, decomposition, constraints);
     let mut coarse = Coarse::new(comm, decomposition, constraints, &connection);
     let (_, stages) = history::stages(scene, discrete, &|| connection.gather.zeros());
-    at_all_stages(scene, discrete, &mut coarse, &connection.space, &connection.modes, &stages)
+    at_all_stages(scene, discrete, &mut coarse, &connection.space, connection.modes(), &stages)
 }
 
 /// As [`held`], with what solving needs too. Leaves the coarse problem factorised. Collective.

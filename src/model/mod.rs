@@ -19,6 +19,7 @@ use thiserror::Error;
 use self::meshes::MeshError;
 use crate::contact::ContactError;
 use crate::feti::coarse::Floating;
+use crate::feti::dual::hybrid::Loose;
 
 /// Why a scene has no discrete problem; the same on every rank.
 #[derive(Debug, Error)]
@@ -38,4 +39,7 @@ pub enum ModelError {
     /// Some body can move freely.
     #[error(transparent)]
     Floating(#[from] Floating),
+    /// The members of a cluster are not held by each other.
+    #[error(transparent)]
+    Loose(#[from] Loose),
 }

@@ -131,11 +131,11 @@ impl StepSolver<'_> {
     ) -> Certificate {
         // Admissible multipliers that balance the loads on every subdomain.
         let (mut lambda, balanced) = timer.time("coarse problem", || self.equilibrate(problem, lambda));
-        if self.operator.inverse.is_hybrid() {
+        if self.operator.is_hybrid() {
             let mut torn = problem.unbalance(state);
             problem.gather.add_transpose(-1.0, &lambda, &mut torn);
-            timer.time("certificate", || self.operator.inverse.solve(&mut torn));
-            self.operator.add_bonds(problem.constraints, [&mut lambda]);
+            timer.time("certificate", || self.operator.solve(&mut torn));
+            self.operator.add_bonds([&mut lambda]);
         }
         // lambda_I'(c - B u)_I.
         let open = problem.space.dots(&[(&problem.of_contact(&lambda), &problem.slack(u))])[0].max(0.0);
@@ -146,7 +146,7 @@ impl StepSolver<'_> {
         for solves in 1..=TURNS {
             // The other three terms at v; the last one with r = 1 is the least that knowing r could make of it.
             let mut correction = trial.rho.clone();
-            timer.time("certificate", || self.operator.inverse.solve_each(&mut correction));
+            timer.time("certificate", || self.operator.inverse.solve(&mut correction));
             let terms = timer.time("certificate", || trial.terms(problem, &correction, solves == 1));
             let sum = problem.space.sum(&terms, 4);
             let known = open + sum[0] + sum[1].max(0.0);

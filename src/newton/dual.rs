@@ -65,7 +65,8 @@ impl<'a> Dual<'_, 'a> {
     /// `z = M r`; false if there is no preconditioner.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         let Some(preconditioner) = &mut self.preconditioner else { return false };
-        self.timer.time("preconditioner", || preconditioner.apply(r, z));
+        let apply = |r: &[f64], z: &mut [f64]| self.timer.time("preconditioner", || preconditioner.apply(r, z));
+        self.operator.precondition(r, z, apply);
         self.timer.count("preconditioner", 0.0, preconditioner.bytes_per_apply());
         true
     }

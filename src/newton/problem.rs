@@ -73,7 +73,7 @@ impl<'a> TornProblem<'a> {
     /// Of a discrete problem, with what is prescribed now; nothing is committed yet.
     pub fn new(
         discrete: &'a Discrete,
-        Interconnection { gather, space, modes }: &'a Interconnection<'a>,
+        connection: &'a Interconnection<'a>,
         sums: &'a NodeSums<'a>,
         Conditions { loads, rhs }: Conditions,
     ) -> Self {
@@ -83,14 +83,14 @@ impl<'a> TornProblem<'a> {
         Self {
             subdomains,
             materials: subdomains.iter().map(|s| materials[s.material]).collect(),
-            modes,
+            modes: connection.modes(),
             loads,
             rhs,
             committed: Committed::default(),
             constraints,
-            gather,
+            gather: &connection.gather,
             coupling: RefCell::new(Coupling::new(constraints)),
-            space,
+            space: &connection.space,
             sums,
             yields: bodies.iter().flat_map(|body| &body.materials).any(yields),
         }

@@ -20,8 +20,9 @@ use crate::feti::Torn;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::motion;
 use crate::feti::coarse::recover;
-use crate::feti::dual::operator::{DualOperator, Singular};
+use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::basis::Bases;
+use crate::feti::inverse::factor::NotDefinite;
 use crate::feti::inverse::tangents::Linearisation;
 use crate::feti::preconditioner::Preconditioner;
 use crate::monitor::timing::Timer;
@@ -244,7 +245,7 @@ impl<'a> StepSolver<'a> {
         (u, state): (&Torn, &State),
         left: f64,
         timer: &Timer,
-    ) -> Result<usize, Singular> {
+    ) -> Result<usize, NotDefinite> {
         let Self { operator, preconditioner, flows, .. } = self;
         let at = Linearisation { regions: &problem.regions(), u, yielding: &state.yielding, flows };
         let interiors = preconditioner.as_mut().map(Preconditioner::interiors);
@@ -278,7 +279,7 @@ impl<'a> StepSolver<'a> {
         let (local_residual, refined) = timer
             .time("refinement", || self.operator.inverse.refine(&|x| problem.space.norm(x), (&local, &mut du), wanted));
         if refined > 0 {
-            self.operator.inverse.rejoin(&mut du);
+            self.operator.rejoin(&mut du);
             self.operator.add_hidden(constraints, (forces, &du), [lambda, balanced]);
             problem.gather.apply(&du, &mut defect);
         }

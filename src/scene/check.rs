@@ -7,7 +7,7 @@ use super::Fault;
 use super::Scene;
 use super::body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
 use super::contact::{Contact, Sides};
-use super::decomposition::Method;
+use super::decomposition::{Groups, Method};
 use super::held::Held;
 use super::initial::Initial;
 use super::load::Load;
@@ -225,8 +225,13 @@ fn step(scene: &Scene, key: &str, step: &Step) -> Checked {
 }
 
 fn decomposition(scene: &Scene) -> Checked {
-    if let Some(cluster) = scene.decomposition.cluster {
-        require(cluster >= 1, "decomposition.cluster", cluster, "must be at least 1")?;
+    let sizes = match &scene.decomposition.cluster {
+        None => &[][..],
+        Some(Groups::Equal(size)) => std::slice::from_ref(size),
+        Some(Groups::Levels(sizes)) => sizes,
+    };
+    for &size in sizes {
+        require(size >= 1, "decomposition.cluster", size, "must be at least 1")?;
     }
     match scene.decomposition.method {
         Method::Auto => Ok(()),

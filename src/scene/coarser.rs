@@ -2,7 +2,7 @@
 
 use super::body::Shape;
 use super::mapped::Grid;
-use super::{Method, Scene};
+use super::{Groups, Method, Scene};
 
 impl Scene {
     /// With cells `factor` times as large along each edge, as far as that leaves one; each body is cut into no more parts than
@@ -21,7 +21,7 @@ impl Scene {
         }
         let regions = scene.body.values().map(|body| body.material.names().len()).sum();
         scene.decomposition.method = Method::Metis { subdomains: Some(regions) };
-        scene.decomposition.cluster = Some(1);
+        scene.decomposition.cluster = Some(Groups::Equal(1));
         scene
     }
 

@@ -9,13 +9,23 @@ pub struct Decomposition {
     /// How subdomains are cut.
     #[serde(flatten)]
     pub method: Method,
-    /// About how many neighbouring subdomains share one set of rigid motions in the coarse problem; 1 for plain Total FETI.
-    /// Absent: by their number.
+    /// Groups of neighbouring subdomains; the largest share one set of rigid motions in the coarse problem. Absent: by the number of
+    /// subdomains.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub cluster: Option<usize>,
+    pub cluster: Option<Groups>,
     /// Whether `cells` were given beside a method that has none: a file can keep them while its user tries these.
     #[serde(skip)]
     pub idle_cells: bool,
+}
+
+/// Sizes of groups of subdomains.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Groups {
+    /// About so many on each level, and as many levels as the coarse problem needs; 1 for plain Total FETI.
+    Equal(usize),
+    /// About so many subdomains in a group, so many groups in a group of the next level, and so on.
+    Levels(Vec<usize>),
 }
 
 /// The method and its one parameter.
@@ -50,7 +60,7 @@ struct Section {
     method: Option<Name>,
     cells: Option<[usize; 3]>,
     subdomains: Option<usize>,
-    cluster: Option<usize>,
+    cluster: Option<Groups>,
 }
 
 #[derive(Clone, Copy, Deserialize)]

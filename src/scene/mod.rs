@@ -37,7 +37,7 @@ use crate::material::{Law, Material};
 pub use body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
 pub use changes::changes;
 pub use contact::{Contact, Obstacle, Sides};
-pub use decomposition::{Decomposition, Method, PAPER_CELLS};
+pub use decomposition::{Decomposition, Groups, Method, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use held::Held;
 pub use initial::Initial;

@@ -87,6 +87,11 @@ pub(super) fn of_rank_mb(subdomains: f64, clusters: f64, conditions: f64, larges
     PROCESS_MB + megabytes(coarse + 12.0 * largest + KNOWN * subdomains + CONDITION * conditions)
 }
 
+/// Numbers in the inverse of a group of so many members, where no other group is like it.
+pub(super) fn of_group(members: f64) -> f64 {
+    (6.0 * (members - 1.0)).powi(2)
+}
+
 pub(super) fn megabytes(bytes: f64) -> f64 {
     bytes / f64::from(1 << 20)
 }

@@ -5,10 +5,9 @@ use std::rc::Rc;
 use super::memory::{self, Lengths, Memory, PROCESS_MB, SLOT};
 use crate::comm::{Comm, Shares, maximum, ordered_sum};
 use crate::constraint::Kind;
-use crate::decomposition::Cut;
+use crate::decomposition::{Clusters, Cut};
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::factor::{Symbolic, analyse};
-use crate::feti::inverse::hybrid;
 use crate::model::discrete::{Discrete, cut};
 use crate::record::counts::Sizes;
 use crate::scene::Scene;
@@ -60,14 +59,20 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
     let lengths: Vec<Lengths> = analyse(&decomposition.subdomains).iter().map(lengths).collect();
     let numbers: f64 = lengths.iter().map(|&lengths| memory::of_subdomain(scene, lengths, is_box)).sum();
     let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
-    let clusters = decomposition.clusters.of_rank(comm.rank()).filter(|members| members.len() > 1);
-    let bonds: f64 = clusters.map(|members| hybrid::numbers(&decomposition.subdomains[members]) as f64).sum();
     let slots = SLOT * constraints.slot_subdomain.len() as f64;
-    let mine = memory::megabytes(8.0 * (numbers + bonds + slots));
+    let mine = memory::megabytes(8.0 * (numbers + slots));
+    let groups = if is_box { 0.0 } else { groups(&decomposition.clusters) };
     let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
     Memory {
-        subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0],
+        subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0]
+            + memory::megabytes(8.0 * groups),
         rank_mb: memory::of_rank_mb(subdomains, clusters, contacts.pairs.len() as f64, largest),
         cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)),
     }
+}
+
+/// Numbers in the inverses of groups' members, if none are alike.
+fn groups(clusters: &Clusters) -> f64 {
+    let of_level = |level: usize| (0..clusters.count(level)).map(move |group| clusters.children(level, group).len());
+    (1..=clusters.levels()).flat_map(of_level).map(|members| memory::of_group(members as f64)).sum()
 }

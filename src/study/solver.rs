@@ -4,10 +4,10 @@ use crate::comm::Comm;
 use crate::decomposition::twins::{alike, twins};
 use crate::feti::coarse::Coarse;
 use crate::feti::dual::Interconnection;
+use crate::feti::dual::hybrid::Hybrid;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::analyse;
-use crate::feti::inverse::hybrid::Hybrid;
 use crate::feti::inverse::pinnable;
 use crate::feti::inverse::schur::Schur;
 use crate::feti::preconditioner::Preconditioner;
@@ -26,13 +26,14 @@ pub(super) fn step_solver<'a>(
     scene: &Scene,
     discrete: &'a Discrete,
     comm: &'a dyn Comm,
-    connection: &'a Interconnection,
+    connection: &'a Interconnection<'a>,
     stages: &[Stage],
     timer: &Timer,
 ) -> Result<StepSolver<'a>, ModelError> {
     let Discrete { decomposition, constraints, .. } = discrete;
-    let Interconnection { gather, space, modes } = connection;
-    let (subdomains, clusters) = (&decomposition.subdomains[..], &decomposition.clusters);
+    let Interconnection { gather, space, .. } = connection;
+    let modes = connection.modes();
+    let subdomains = &decomposition.subdomains[..];
     let mut coarse = timer.time("coarse set-up", || Coarse::new(comm, decomposition, constraints, connection));
     let symbolic = timer.time("symbolic analysis", || analyse(subdomains));
     let precision = match scene.solver.precision {
@@ -52,11 +53,10 @@ pub(super) fn step_solver<'a>(
     let preconditioner =
         schur.map(|schur| Preconditioner::new(comm, &decomposition.shares, constraints, gather, schur));
     timer.time("coarse set-up", || model::held::at_all_stages(scene, discrete, &mut coarse, space, modes, stages))?;
-    let hybrid = (!clusters.are_single())
-        .then(|| timer.time("clusters", || Hybrid::new(clusters.of_rank(comm.rank()), subdomains)));
+    let hybrid = timer.time("clusters", || Hybrid::of_clusters(connection, decomposition, constraints))?;
     let pinnable = pinnable::unknowns(constraints, subdomains, modes);
-    let inverse = Inverse::new(symbolic, precision, hybrid, twins(comm, subdomains), pinnable);
-    let operator = DualOperator::new(inverse, gather);
+    let inverse = Inverse::new(symbolic, precision, twins(comm, subdomains), pinnable);
+    let operator = DualOperator::new(inverse, hybrid, gather);
     Ok(StepSolver::new(operator, coarse, preconditioner, programs(scene)))
 }
 

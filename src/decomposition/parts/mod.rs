@@ -17,17 +17,17 @@ mod portion;
 mod sides;
 mod wholes;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::mem::replace;
 
 use self::compact::{compact, on_grid};
 use self::diffusion::Ground;
-use self::groups::groups;
+use self::groups::{Cluster, Faces, clusters, groups};
 use self::pieces::Pieces;
 use self::portion::Portion;
 use self::sides::Sides;
 use self::wholes::{Wholes, spread};
-use super::shares::{by_cost, interleave};
+use super::shares::{interleave, whole_groups};
 use super::subdomain::{pack_pairs, unpack_pairs};
 use super::{Bodies, Clusters, Patch, Shape, Subdomain};
 use crate::comm::{Comm, Shares, all_gather_u64, from_root};
@@ -38,12 +38,12 @@ use crate::mesh::faces::{Neighbours, key};
 /// No part may have more than so many times the mean number of elements.
 const LARGEST: f64 = 1.25;
 
-/// Cuts all bodies into about `parts` parts (more where a part had to be split to be face-connected), in clusters of about
-/// `cluster` neighbouring ones. Returns the clusters, the shares and this rank's subdomains. Collective.
+/// Cuts all bodies into about `parts` parts (more where a part had to be split to be face-connected), in groups of about so many
+/// on each level. Returns the clusters, the shares and this rank's subdomains. Collective.
 pub(crate) fn own_subdomains(
     bodies: &Bodies,
     parts: usize,
-    cluster: usize,
+    sizes_of_groups: &[usize],
     comm: &dyn Comm,
 ) -> (Clusters, Shares, Vec<Subdomain>) {
     let dealt: Vec<Dealt> = (0..bodies.bodies.len()).map(|body| Dealt::new(bodies, body, comm)).collect();
@@ -54,26 +54,23 @@ pub(crate) fn own_subdomains(
     let mut wanted = spread(parts, &sizes).into_iter();
     let mut cut = |dealt: Dealt| {
         let parts = wanted.by_ref().take(dealt.sizes.len()).collect();
-        Cut::new(dealt, parts, cluster, comm)
+        Cut::new(dealt, parts, sizes_of_groups, comm)
     };
     let cuts: Vec<Cut> = dealt.into_iter().map(&mut cut).collect();
 
     // Numbers and owners.
-    let order = interleave(&cuts.iter().map(|cut| cut.clusters.len()).collect::<Vec<_>>());
-    let members = |&(body, cluster): &(usize, usize)| cuts[body].clusters[cluster].as_slice();
-    let costs: Vec<Vec<u64>> = cuts.iter().map(|cut| costs(&cut.portion, cut.sizes.len(), comm)).collect();
-    let cost = |at: &(usize, usize)| members(at).iter().map(|&part| costs[at.0][part as usize]).sum();
-    let shares = by_cost(&order.iter().map(cost).collect::<Vec<_>>(), comm.size());
-    let mut places: Vec<Vec<(usize, usize)>> = cuts.iter().map(|cut| vec![(0, 0); cut.sizes.len()]).collect();
-    let mut id = 0;
-    for (cluster, at) in order.iter().enumerate() {
-        for &part in members(at) {
-            places[at.0][part as usize] = (id, shares.owner(cluster));
-            id += 1;
-        }
+    let (mut order, mut groups) = (Vec::new(), vec![Vec::new(); sizes_of_groups.len()]);
+    for (body, cluster) in interleave(&cuts.iter().map(|cut| cut.clusters.len()).collect::<Vec<_>>()) {
+        let Cluster { members, sizes } = &cuts[body].clusters[cluster];
+        order.extend(members.iter().map(|&part| (body, part as usize)));
+        groups.iter_mut().zip(sizes).for_each(|(all, sizes)| all.extend(sizes));
     }
-    let counts: Vec<usize> = order.iter().map(|at| members(at).len()).collect();
-    let (clusters, shares) = Clusters::new(shares, &counts);
+    let clusters = Clusters::new(order.len(), &groups);
+    let costs: Vec<Vec<u64>> = cuts.iter().map(|cut| costs(&cut.portion, cut.sizes.len(), comm)).collect();
+    let cost = |id: usize| costs[order[id].0][order[id].1];
+    let shares = whole_groups(&clusters, cost, comm.size());
+    let mut places: Vec<Vec<(usize, usize)>> = cuts.iter().map(|cut| vec![(0, 0); cut.sizes.len()]).collect();
+    order.iter().enumerate().for_each(|(id, &(body, part))| places[body][part] = (id, shares.owner(id)));
     let mut own = Vec::new();
     for (body, (cut, places)) in cuts.into_iter().zip(&places).enumerate() {
         own.extend(cut.subdomains(bodies, body, places, comm));
@@ -144,15 +141,14 @@ struct Cut {
     portion: Portion,
     /// Elements of each part.
     sizes: Vec<u64>,
-    /// Parts of each cluster, ascending.
-    clusters: Vec<Vec<u32>>,
+    clusters: Vec<Cluster>,
     of_wholes: Vec<[usize; 2]>,
 }
 
 impl Cut {
     /// Into so many parts of each whole, in clusters of about so many. Where compact parts are too few or one is large, as on meshes
     /// whose sizes differ much, only faces are made smooth, or nothing is done. Collective.
-    fn new(Dealt { portion, sizes, of_wholes }: Dealt, parts: Vec<u32>, cluster: usize, comm: &dyn Comm) -> Self {
+    fn new(Dealt { portion, sizes, of_wholes }: Dealt, parts: Vec<u32>, groups: &[usize], comm: &dyn Comm) -> Self {
         let wholes = Wholes::new(sizes, parts);
         let rank = |part: u32| part as usize * comm.size() / wholes.parts();
         let mut portion = portion;
@@ -174,7 +170,7 @@ impl Cut {
                 sides.flatten(&mut moved.part, &wholes);
             }
             let moved = moved.sent(comm, |at| rank(moved.part[at]));
-            let cut = Self::joined(moved, &wholes, cluster, comm);
+            let cut = Self::joined(moved, &wholes, groups, comm);
             let is_even = |(part, &size): (usize, &u64)| size as f64 <= LARGEST * wholes.mean(cut.1[part]);
             let is_sound = cut.0.sizes.len() >= wholes.parts() && cut.0.sizes.iter().enumerate().all(is_even);
             if is_sound || !is_smooth {
@@ -185,7 +181,7 @@ impl Cut {
     }
 
     /// Makes pieces of parts that do not hang together parts of their own, or of others; also the whole of each part.
-    fn joined(mut portion: Portion, wholes: &Wholes, cluster: usize, comm: &dyn Comm) -> (Self, Vec<u32>) {
+    fn joined(mut portion: Portion, wholes: &Wholes, levels: &[usize], comm: &dyn Comm) -> (Self, Vec<u32>) {
         let pieces = Pieces::new(comm, &portion);
         let to = pieces.join(wholes);
         let count = to.iter().max().map_or(0, |&last| last as usize + 1);
@@ -195,22 +191,22 @@ impl Cut {
             of[to as usize] = piece.whole;
         }
         portion.part = pieces.own.iter().map(|&piece| to[piece as usize]).collect();
-        let mut faces = BTreeMap::new();
+        let mut faces = Faces::new();
         for (&(a, b), n) in &pieces.faces {
             let (a, b) = (to[a as usize], to[b as usize]);
             if a != b {
                 *faces.entry((a, b)).or_default() += n;
             }
         }
-        let faces: Vec<((u32, u32), u64)> = faces.into_iter().collect();
-        let group = match cluster {
-            1 => (0..count as u64).collect(),
-            _ if comm.rank() == 0 => groups(count, &faces, cluster).into_iter().map(u64::from).collect(),
-            _ => Vec::new(),
+        let mine = if comm.rank() == 0 { groups(count, faces, levels) } else { Vec::new() };
+        let mut all = from_root(comm, mine.concat().into_iter().map(u64::from).collect()).into_iter().map(|n| n as u32);
+        let mut items = count;
+        let of_level = |_: &usize| {
+            let of: Vec<u32> = all.by_ref().take(items).collect();
+            items = of.iter().max().map_or(0, |&last| last as usize + 1);
+            of
         };
-        let group = from_root(comm, group);
-        let mut clusters = vec![Vec::new(); group.iter().max().map_or(0, |&last| last as usize + 1)];
-        (0..).zip(group).for_each(|(part, group)| clusters[group as usize].push(part));
+        let clusters = clusters(count, &levels.iter().map(of_level).collect::<Vec<_>>());
         (Self { portion, sizes, clusters, of_wholes: Vec::new() }, of)
     }
 

@@ -12,16 +12,15 @@ fn parts_are_balanced_and_more_compact_than_those_of_metis_with_as_few_shared_no
     for (kind, wanted) in [(Kind::Tet4, 24), (Kind::Tet4, 60), (Kind::Hex8, 24)] {
         let bodies = number_bodies([(kind, Shape::Brick(brick), vec![0])]);
         let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
-        let Cut { portion, sizes, .. } = Cut::new(Dealt::new(&torn, 0, &Solo), vec![wanted], 1, &Solo);
+        let Cut { portion, sizes, .. } = Cut::new(Dealt::new(&torn, 0, &Solo), vec![wanted], &[], &Solo);
         assert_eq!(sizes.len(), wanted as usize);
         let mean = portion.len() as f64 / f64::from(wanted);
         assert!(sizes.iter().all(|&size| (size as f64 / mean - 1.0).abs() < 0.25), "{sizes:?} around {mean}");
 
         let neighbours = Neighbours::new(portion.nodes.len(), &portion.elements);
         let faces = |element| neighbours.of(element).map(move |other| ((element as u32, other), 1));
-        let mut faces: Vec<_> = (0..portion.len()).flat_map(faces).collect();
-        faces.sort_unstable();
-        let metis = groups(portion.len(), &faces, portion.len() / wanted as usize);
+        let faces = (0..portion.len()).flat_map(faces).collect();
+        let metis = groups(portion.len(), faces, &[portion.len() / wanted as usize]).swap_remove(0);
         let shared = |part: &[u32]| {
             let copies = portion.elements.iter().zip(part).flat_map(|(nodes, p)| nodes.iter().map(move |&n| (n, *p)));
             copies.collect::<BTreeSet<_>>().len() - brick.node_count() as usize

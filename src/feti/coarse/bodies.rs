@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use super::factor::Blocks;
-use crate::comm::Comm;
-use crate::decomposition::{Clusters, Subdomain};
+use crate::decomposition::Subdomain;
+use crate::feti::dual::levels::Tree;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
 use crate::span::complement;
 use crate::vector::{cross, length};
@@ -26,16 +26,16 @@ pub struct BodyMotions {
 
 impl BodyMotions {
     /// Of all bodies, the modes being those of the clusters for each own subdomain. Collective.
-    pub fn new(comm: &dyn Comm, clusters: &Clusters, subdomains: &[Subdomain], modes: &[RigidModes]) -> Self {
-        let members = clusters.of_rank(comm.rank());
+    pub fn new(tree: &Tree, subdomains: &[Subdomain], modes: &[RigidModes]) -> Self {
         let mut mine = Vec::new();
-        for members in members.clone() {
-            let points = || subdomains[members.clone()].iter().flat_map(|s| &s.points);
-            let extreme = |a: usize, sign: f64| points().fold(f64::NEG_INFINITY, |m, p| m.max(sign * p[a]));
-            mine.extend(piece(&subdomains[members.start]).map(|k| k as f64));
+        for subdomain in subdomains {
+            let extreme =
+                |a: usize, sign: f64| subdomain.points.iter().fold(f64::NEG_INFINITY, |m, p| m.max(sign * p[a]));
+            mine.extend(piece(subdomain).map(|k| k as f64));
             (0..3).for_each(|a| mine.extend([extreme(a, 1.0), extreme(a, -1.0)]));
         }
-        let boxes = comm.all_gather(&mine, &clusters.shares.counts(8));
+        // A cluster is of one piece of one body.
+        let boxes = tree.of_clusters(&tree.fold(tree.levels(), &mine, 8, f64::max), 8);
         let of_clusters: Vec<[usize; 2]> = boxes.chunks_exact(8).map(|b| [b[0] as usize, b[1] as usize]).collect();
         let pieces: Vec<[usize; 2]> = of_clusters.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
         let number = |piece: &[usize; 2]| pieces.binary_search(piece).expect("every piece has a cluster");
@@ -51,18 +51,14 @@ impl BodyMotions {
         };
         let frames: Vec<_> = extents.iter().map(frame).collect();
         let mut mine = Vec::new();
-        for members in members {
+        for (subdomain, modes) in subdomains.iter().zip(modes) {
             for motion in 0..MODES {
-                let mut sum = [0.0; MODES];
-                for (s, modes) in subdomains[members.clone()].iter().zip(&modes[members.clone()]) {
-                    let at = |x: &[f64; 3]| displacement(&frames[number(&piece(s))], motion, x);
-                    let moved: Vec<f64> = s.points.iter().flat_map(at).collect();
-                    sum.iter_mut().zip(modes.resultants(&s.points, &moved)).for_each(|(sum, x)| *sum += x);
-                }
-                mine.extend(sum);
+                let at = |x: &[f64; 3]| displacement(&frames[number(&piece(subdomain))], motion, x);
+                let moved: Vec<f64> = subdomain.points.iter().flat_map(at).collect();
+                mine.extend(modes.resultants(&subdomain.points, &moved));
             }
         }
-        let columns = comm.all_gather(&mine, &clusters.shares.counts(MODES * MODES));
+        let columns = tree.of_clusters(&tree.sum(tree.levels(), &mine, MODES * MODES), MODES * MODES);
         let matrices = columns.chunks_exact(MODES * MODES);
         let matrix = |c: &[f64]| std::array::from_fn(|mode| std::array::from_fn(|motion| c[MODES * motion + mode]));
         Self { clusters: bodies.into_iter().zip(matrices.map(matrix)).collect(), pieces, frames }

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::factor::{Block, Blocks};
+use super::factor::Block;
 use crate::constraint::{Constraints, Kind, Row};
 use crate::decomposition::{Clusters, Subdomain};
 use crate::feti::dual::gather::Gather;
@@ -29,22 +29,26 @@ impl Rows {
     }
 }
 
-/// `G` of one rank: all columns of its rows, and all lines of its own clusters.
+/// `G` of one rank: all columns of its rows, and all that its own subdomains add to lines.
 pub(super) struct Matrix {
     /// First slot of each row, and the end.
     begin: Vec<u32>,
-    /// For each slot of each row the cluster, and the values of its six modes. Gluing within a cluster has no slot.
+    /// For each slot of each row the subdomain, its cluster, and the values of the cluster's six modes. Gluing within a cluster has no
+    /// slot.
+    subdomain: Vec<u32>,
     cluster: Vec<u32>,
     modes: Vec<[f64; MODES]>,
     /// Rows with slots: equalities, and inequalities.
     moving: [Vec<u32>; 2],
-    /// Number of the first own cluster.
+    /// Number of the first own subdomain.
     first: usize,
-    /// What acts on each own cluster, in row order: equalities, and inequalities.
+    /// Clusters of own subdomains.
+    clusters: Vec<usize>,
+    /// What acts on each own subdomain, in row order: equalities, and inequalities.
     acting: [Vec<Vec<Acting>>; 2],
 }
 
-/// A row that acts on a cluster, with a copy of its slot's modes: what is summed lies side by side.
+/// A row that acts on a subdomain, with a copy of its slot's modes: what is summed lies side by side.
 struct Acting {
     row: u32,
     modes: [f64; MODES],
@@ -53,7 +57,7 @@ struct Acting {
 impl Matrix {
     /// Of the rows of this rank. One neighbour exchange.
     pub fn new(
-        (clusters, rank): (&Clusters, usize),
+        clusters: &Clusters,
         subdomains: &[Subdomain],
         modes: &[RigidModes],
         constraints: &Constraints,
@@ -61,46 +65,46 @@ impl Matrix {
     ) -> Self {
         let mut result = Self {
             begin: vec![0],
+            subdomain: Vec::new(),
             cluster: Vec::new(),
             modes: Vec::new(),
             moving: Default::default(),
-            first: clusters.shares.begin(rank),
+            first: subdomains.first().map_or(0, |s| s.id),
+            clusters: subdomains.iter().map(|s| clusters.of(s.id)).collect(),
             acting: Default::default(),
         };
-        gather.exchange(
-            MODES,
-            |own, slots| {
-                for entry in gather.entries(own) {
-                    let (node, axis) = (entry.dof as usize / 3, entry.dof as usize % 3);
-                    let row = modes[own].at(subdomains[own].points[node])[axis];
-                    let at = MODES * entry.slot as usize;
-                    slots[at..at + MODES].iter_mut().zip(row).for_each(|(s, r)| *s += entry.value * r);
-                }
-            },
-            |row, values| {
-                let cluster = |slot: usize| clusters.of(constraints.slot_subdomain[slot] as usize) as u32;
-                let slots = constraints.slots(row).map(cluster).zip(values.as_chunks::<MODES>().0);
-                result.push(row, &constraints.rows[row], slots);
-            },
-        );
-        result.act(clusters.shares.0[rank]);
+        let of_node = |own: usize, node: usize| modes[own].at(subdomains[own].points[node]);
+        gather.moved(of_node, |row, values| {
+            let slots = constraints.slots(row).map(|slot| constraints.slot_subdomain[slot]);
+            result.push(row, &constraints.rows[row], clusters, slots.zip(values));
+        });
+        result.act(subdomains.len());
         result
     }
 
-    /// Adds the next row, with the clusters and modes' values of its slots.
-    fn push<'s>(&mut self, row: usize, of: &Row, slots: impl Iterator<Item = (u32, &'s [f64; MODES])>) {
+    /// Adds the next row, with the subdomains and modes' values of its slots.
+    fn push<'s>(
+        &mut self,
+        row: usize,
+        of: &Row,
+        clusters: &Clusters,
+        slots: impl Iterator<Item = (u32, &'s [f64; MODES])>,
+    ) {
         let begin = self.cluster.len();
-        for (cluster, six) in slots {
-            // Copies of one node, unless it is contact.
-            let is_copy = of.law().always_holds() && self.cluster[begin..].last() == Some(&cluster);
-            if let Some(sum) = self.modes.last_mut().filter(|_| is_copy) {
+        for (subdomain, six) in slots {
+            // Several nodes of one subdomain, unless it is contact.
+            let is_same = of.law().always_holds() && self.subdomain[begin..].last() == Some(&subdomain);
+            if let Some(sum) = self.modes.last_mut().filter(|_| is_same) {
                 sum.iter_mut().zip(six).for_each(|(s, x)| *s += x);
             } else {
-                self.cluster.push(cluster);
+                self.subdomain.push(subdomain);
+                self.cluster.push(clusters.of(subdomain as usize) as u32);
                 self.modes.push(*six);
             }
         }
-        if of.kind == Kind::Gluing && self.cluster.len() == begin + 1 {
+        let is_within = self.cluster[begin..].windows(2).all(|pair| pair[0] == pair[1]);
+        if of.kind == Kind::Gluing && is_within {
+            self.subdomain.truncate(begin);
             self.cluster.truncate(begin);
             self.modes.truncate(begin);
         }
@@ -110,13 +114,13 @@ impl Matrix {
         self.begin.push(self.cluster.len() as u32);
     }
 
-    /// Finds what acts on each of `count` own clusters.
+    /// Finds what acts on each of `count` own subdomains.
     fn act(&mut self, count: usize) {
         for rows in Rows::ALL {
             let mut acting: Vec<Vec<Acting>> = (0..count).map(|_| Vec::new()).collect();
             for &row in &self.moving[rows as usize] {
                 for slot in self.slots(row as usize) {
-                    let own = (self.cluster[slot] as usize).checked_sub(self.first);
+                    let own = (self.subdomain[slot] as usize).checked_sub(self.first);
                     if let Some(acting) = own.and_then(|own| acting.get_mut(own)) {
                         acting.push(Acting { row, modes: self.modes[slot] });
                     }
@@ -141,7 +145,7 @@ impl Matrix {
         self.slots(row).map(|slot| (self.cluster[slot] as usize, &self.modes[slot]))
     }
 
-    /// `G x` on the own clusters by some rows of `x`, summed in the order of the rows.
+    /// What own subdomains add to `G x` by some rows of `x`, summed in the order of the rows.
     pub fn resultants(&self, rows: Rows, x: impl Fn(usize) -> f64) -> impl Iterator<Item = [f64; MODES]> {
         self.acting[rows as usize].iter().map(move |acting| {
             let mut sum = [0.0; MODES];
@@ -162,11 +166,11 @@ impl Matrix {
         }
     }
 
-    /// Blocks of `G W G'` of some rows with the diagonal `W`: the lower ones on own clusters. Complete: every row that a subdomain
-    /// takes part in is on its rank.
-    pub fn products(&self, rows: Rows, weight: impl Fn(usize) -> f64) -> Blocks {
-        let mut result = Blocks::new();
-        for (cluster, acting) in (self.first..).zip(&self.acting[rows as usize]) {
+    /// Blocks of `G W G'` of some rows with the diagonal `W`: for each own subdomain its cluster, and what it adds to the lower blocks
+    /// of that line, by column. Complete: every row that a subdomain takes part in is on its rank.
+    pub fn products(&self, rows: Rows, weight: impl Fn(usize) -> f64) -> Vec<(usize, Vec<(usize, Block)>)> {
+        let mut result = Vec::new();
+        for (&cluster, acting) in self.clusters.iter().zip(&self.acting[rows as usize]) {
             // A cluster has few neighbours.
             let (mut columns, mut blocks): (Vec<u32>, Vec<Block>) = Default::default();
             for Acting { row, modes } in acting {
@@ -190,7 +194,7 @@ impl Matrix {
                     }
                 }
             }
-            result.extend(columns.into_iter().map(|column| (cluster, column as usize)).zip(blocks));
+            result.push((cluster, columns.into_iter().map(|column| column as usize).zip(blocks).collect()));
         }
         result
     }

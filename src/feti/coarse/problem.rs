@@ -5,7 +5,6 @@
 //! same bits, and `G'a` needs no further exchange.
 
 use std::cell::OnceCell;
-use std::ops::Range;
 use std::rc::Rc;
 
 use thiserror::Error;
@@ -13,12 +12,13 @@ use thiserror::Error;
 use super::base::Base;
 use super::bodies::BodyMotions;
 use super::face::CoarseFace;
-use super::factor::{Blocks, CoarseAnalysis, CoarseFactor};
+use super::factor::{Block, Blocks, CoarseAnalysis, CoarseFactor};
 use super::matrix::{Matrix, Rows};
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::Constraints;
 use crate::decomposition::{Clusters, Decomposition};
 use crate::feti::dual::Interconnection;
+use crate::feti::dual::levels::Tree;
 use crate::feti::inverse::kernel::MODES;
 
 /// The constraints leave a rigid motion free.
@@ -35,9 +35,8 @@ pub struct Floating {
 /// `G` and the coarse problem.
 pub struct Coarse<'a> {
     comm: &'a dyn Comm,
-    clusters: Clusters,
-    /// Own clusters, as ranges of own subdomains.
-    members: Vec<Range<usize>>,
+    clusters: &'a Clusters,
+    tree: &'a Tree<'a>,
     matrix: Matrix,
     motions: BodyMotions,
     /// One over the squared length of each row, and whether rows are of unequal length.
@@ -57,16 +56,17 @@ impl<'a> Coarse<'a> {
     /// Computes `G = R'B'`. Nothing is solved before [`Coarse::factorise`]. Collective.
     pub fn new(
         comm: &'a dyn Comm,
-        Decomposition { clusters, subdomains, .. }: &Decomposition,
+        Decomposition { clusters, subdomains, .. }: &'a Decomposition,
         constraints: &Constraints,
-        Interconnection { gather, modes, .. }: &Interconnection,
+        connection: &'a Interconnection<'a>,
     ) -> Self {
+        let (tree, modes) = (&connection.tree, connection.modes());
         Self {
             comm,
-            motions: BodyMotions::new(comm, clusters, subdomains, modes),
-            members: clusters.of_rank(comm.rank()).collect(),
-            matrix: Matrix::new((clusters, comm.rank()), subdomains, modes, constraints, gather),
-            clusters: clusters.clone(),
+            motions: BodyMotions::new(tree, subdomains, modes),
+            matrix: Matrix::new(clusters, subdomains, modes, constraints, &connection.gather),
+            clusters,
+            tree,
             unit: constraints.rows.iter().map(|row| (row.length * row.length).recip()).collect(),
             uneven: constraints.uneven,
             equalities: OnceCell::new(),
@@ -170,14 +170,29 @@ impl<'a> Coarse<'a> {
     }
 
     fn products(&self, rows: Rows, weight: impl Fn(usize) -> f64) -> Blocks {
-        let mut message = Vec::new();
-        for ((row, column), block) in self.matrix.products(rows, weight) {
-            message.extend([row as u64, column as u64]);
-            message.extend(block.map(f64::to_bits));
+        let mut of_clusters = Vec::new();
+        for (row, blocks) in self.matrix.products(rows, weight) {
+            of_clusters.extend(blocks.into_iter().map(|(column, block)| ((row, column), block)));
         }
-        let all = all_gather_u64(self.comm, &message);
-        let blocks = all.as_chunks::<{ 2 + MODES * MODES }>().0.iter();
-        blocks.map(|&[row, column, block @ ..]| ((row as usize, column as usize), block.map(f64::from_bits))).collect()
+        if !self.clusters.are_single() {
+            of_clusters = self.brought_home(of_clusters);
+        }
+        unpack(&all_gather_u64(self.comm, &pack(&of_clusters))).collect()
+    }
+
+    /// Sums of the blocks that subdomains have a part in, on the rank where the row's cluster is at home, in the order of the
+    /// subdomains. Collective.
+    fn brought_home(&self, parts: Vec<((usize, usize), Block)>) -> Vec<((usize, usize), Block)> {
+        let mut outgoing = vec![Vec::new(); self.comm.size()];
+        for part in parts {
+            let home = self.tree.home(self.clusters.first(part.0.0));
+            outgoing[home].extend(pack(&[part]));
+        }
+        let mut sums = Blocks::new();
+        for theirs in self.comm.all_to_all(outgoing) {
+            unpack(&theirs).for_each(|(place, block)| add_block(&mut sums, place, block));
+        }
+        sums.into_iter().collect()
     }
 
     /// Rigid motions of whole bodies, orthonormal, that equalities leave free. They do not depend on how long rows are. Collective.
@@ -209,7 +224,7 @@ impl<'a> Coarse<'a> {
         let [equalities, inequalities] = Rows::ALL.map(|part| self.matrix.resultants(part, |row| rows[row]));
         let both = |(e, i): ([f64; MODES], [f64; MODES])| -> [f64; MODES] { std::array::from_fn(|k| e[k] + i[k]) };
         let mine: Vec<[f64; MODES]> = equalities.zip(inequalities).map(both).collect();
-        self.comm.all_gather(mine.as_flattened(), &self.clusters.shares.counts(MODES))
+        self.share(mine.as_flattened())
     }
 
     /// `G_B x`, `G_X x` and `G_X r` with the rows B of a base and all others X, and the sums over all subdomains of `width`
@@ -221,7 +236,6 @@ impl<'a> Coarse<'a> {
         partial: &[f64],
         width: usize,
     ) -> ([Vec<f64>; 3], Vec<f64>) {
-        let partial = self.over_members(partial, width);
         let outside = |row: usize, x: &[f64]| if base.has_contact(row) { 0.0 } else { x[row] };
         let mut equalities = self.matrix.resultants(Rows::Equalities, |row| x[row]);
         let mut inside =
@@ -230,14 +244,14 @@ impl<'a> Coarse<'a> {
         let mut beside =
             self.matrix.resultants(Rows::Inequalities, |row| if r.is_empty() { 0.0 } else { outside(row, r) });
         let length = 3 * MODES + width;
-        let mut mine = Vec::with_capacity(length * self.members.len());
-        for own in 0..self.members.len() {
+        let mut mine = Vec::with_capacity(length * self.tree.own());
+        for own in 0..self.tree.own() {
             let (e, i) = (equalities.next().unwrap_or_default(), inside.next().unwrap_or_default());
             mine.extend(e.iter().zip(i).map(|(e, i)| e + i));
             mine.extend(contacts.next().into_iter().chain(beside.next()).flatten());
             mine.extend_from_slice(&partial[width * own..][..width]);
         }
-        let all = self.comm.all_gather(&mine, &self.clusters.shares.counts(length));
+        let all = self.over_clusters(&mine, length);
         let mut sums = vec![0.0; width];
         let mut parts = [(); 3].map(|()| Vec::with_capacity(MODES * self.clusters.total()));
         for of_cluster in all.chunks_exact(length) {
@@ -250,20 +264,12 @@ impl<'a> Coarse<'a> {
 
     /// Sums six numbers an own subdomain over each cluster and brings them to every rank.
     pub fn share(&self, mine: &[f64]) -> Vec<f64> {
-        self.comm.all_gather(&self.over_members(mine, MODES), &self.clusters.shares.counts(MODES))
+        self.over_clusters(mine, MODES)
     }
 
-    /// Sums of `width` numbers an own subdomain over each own cluster.
-    fn over_members(&self, mine: &[f64], width: usize) -> Vec<f64> {
-        let mut sums = Vec::with_capacity(width * self.members.len());
-        for members in &self.members {
-            let begin = sums.len();
-            sums.extend_from_slice(&mine[width * members.start..][..width]);
-            for member in members.start + 1..members.end {
-                sums[begin..].iter_mut().zip(&mine[width * member..]).for_each(|(s, x)| *s += x);
-            }
-        }
-        sums
+    /// Sums of `width` numbers an own subdomain over each cluster, of all clusters on every rank. Collective.
+    fn over_clusters(&self, mine: &[f64], width: usize) -> Vec<f64> {
+        self.tree.of_clusters(&self.tree.sum(self.tree.levels(), mine, width), width)
     }
 
     /// Of six numbers a cluster, those for a subdomain.
@@ -289,8 +295,23 @@ impl<'a> Coarse<'a> {
 }
 
 fn add(blocks: &mut Blocks, more: Blocks) {
-    for (place, product) in more {
-        let block = blocks.entry(place).or_insert([0.0; MODES * MODES]);
-        block.iter_mut().zip(product).for_each(|(b, p)| *b += p);
-    }
+    more.into_iter().for_each(|(place, product)| add_block(blocks, place, product));
+}
+
+fn add_block(blocks: &mut Blocks, place: (usize, usize), product: Block) {
+    let block = blocks.entry(place).or_insert([0.0; MODES * MODES]);
+    block.iter_mut().zip(product).for_each(|(b, p)| *b += p);
+}
+
+/// Blocks as a message.
+fn pack(blocks: &[((usize, usize), Block)]) -> Vec<u64> {
+    let numbers = |((row, column), block): &((usize, usize), Block)| {
+        [*row as u64, *column as u64].into_iter().chain(block.map(f64::to_bits)).collect::<Vec<_>>()
+    };
+    blocks.iter().flat_map(numbers).collect()
+}
+
+fn unpack(message: &[u64]) -> impl Iterator<Item = ((usize, usize), Block)> {
+    let blocks = message.as_chunks::<{ 2 + MODES * MODES }>().0.iter();
+    blocks.map(|&[row, column, ref block @ ..]| ((row as usize, column as usize), block.map(f64::from_bits)))
 }

@@ -43,7 +43,7 @@ fn coarse_products_and_solutions_are_the_same_bits_on_any_ranks() {
         same_on_any_ranks(&scene, |setup| {
             let coarse = setup.coarse().expect("the bodies are held");
             let a = coarse.apply(&setup.multipliers(2));
-            let shares = &setup.discrete.decomposition.clusters.shares;
+            let shares = &setup.tree.clusters;
             a[MODES * shares.begin(setup.comm.rank())..][..MODES * shares.0[setup.comm.rank()]].to_vec()
         });
         same_on_any_ranks(&scene, |setup| {

@@ -1,11 +1,10 @@
 //! `F = B K^+ B'`, applied subdomain by subdomain through the factors, or cluster by cluster.
 
-use thiserror::Error;
-
 use super::gather::Gather;
+use super::hybrid::Hybrid;
 use super::space::RowSpace;
 use crate::assembly::Region;
-use crate::constraint::{Constraints, Kind};
+use crate::constraint::Constraints;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::feti::inverse::Inverse;
@@ -15,20 +14,6 @@ use crate::feti::inverse::schur::Schur;
 use crate::feti::inverse::tangents::Linearisation;
 use crate::monitor::timing::Timer;
 use crate::sparse::cholesky::Precision;
-
-/// A tangent has no generalised inverse; the same on every rank.
-#[derive(Debug, Error, PartialEq, Eq)]
-pub enum Singular {
-    /// That of a subdomain is singular beyond its rigid motions.
-    #[error(transparent)]
-    Subdomain(#[from] NotDefinite),
-    /// Nothing holds the members of a cluster together.
-    #[error("the cluster of subdomain {subdomain} has no stiffness: set decomposition.cluster = 1")]
-    Cluster {
-        /// The first of the cluster.
-        subdomain: usize,
-    },
-}
 
 /// What an update changed, of all subdomains on every rank.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,17 +26,18 @@ pub struct Changes {
 
 /// The dual operator; counts its applications.
 pub struct DualOperator<'a> {
-    /// `K^+`, to be applied by itself too.
+    /// `K^+` of each subdomain, to be applied by itself too.
     pub inverse: Inverse,
+    hybrid: Option<Hybrid<'a>>,
     pub(super) gather: &'a Gather<'a>,
     pub(super) torn: Torn,
     applications: usize,
 }
 
 impl<'a> DualOperator<'a> {
-    /// On a generalised inverse, which gets its numbers by [`DualOperator::update`].
-    pub fn new(inverse: Inverse, gather: &'a Gather<'a>) -> Self {
-        Self { inverse, gather, torn: gather.zeros(), applications: 0 }
+    /// On a generalised inverse, which gets its numbers by [`DualOperator::update`], of clusters if there are any.
+    pub fn new(inverse: Inverse, hybrid: Option<Hybrid<'a>>, gather: &'a Gather<'a>) -> Self {
+        Self { inverse, hybrid, gather, torn: gather.zeros(), applications: 0 }
     }
 
     /// Takes over the tangents at an iterate, see [`Inverse::update`]. Collective.
@@ -65,12 +51,8 @@ impl<'a> DualOperator<'a> {
         mut interiors: Option<&mut Schur>,
         space: &RowSpace,
         timer: &Timer,
-    ) -> Result<Changes, Singular> {
+    ) -> Result<Changes, NotDefinite> {
         let fresh = agree(self.inverse.update(at, left, interiors.as_deref_mut(), timer), space)?;
-        if self.inverse.is_hybrid() {
-            let loose = self.inverse.update_clusters(timer).err().map(|own| at.regions[own].subdomain.id);
-            space.lowest(loose).map_or(Ok(()), |subdomain| Err(Singular::Cluster { subdomain }))?;
-        }
         let is_weak = |own| interiors.as_ref().is_some_and(|schur| schur.is_weak(own));
         let of_own = |(own, fresh): (usize, bool)| [fresh, is_weak(own)].map(|is| f64::from(u8::from(is)));
         let mine: Vec<f64> = fresh.into_iter().enumerate().flat_map(of_own).collect();
@@ -90,7 +72,7 @@ impl<'a> DualOperator<'a> {
         interiors: Option<&mut Schur>,
         space: &RowSpace,
         timer: &Timer,
-    ) -> Result<(), Singular> {
+    ) -> Result<(), NotDefinite> {
         agree(self.inverse.remake(regions, made_of, interiors, timer), space)
     }
 
@@ -105,29 +87,47 @@ impl<'a> DualOperator<'a> {
         interiors: &mut Schur,
         space: &RowSpace,
         timer: &Timer,
-    ) -> Result<(), Singular> {
-        agree(self.inverse.strengthen(subdomains, beside, is_any_weak, interiors, timer), space)
+    ) -> Result<(), NotDefinite> {
+        let pins = is_any_weak && self.hybrid.is_none();
+        agree(self.inverse.strengthen(subdomains, beside, pins, interiors, timer), space)
     }
 
     /// Adds to multipliers, which balance each cluster, what balances each of its members: the forces by which these held each
-    /// other in the last [`Inverse::solve`] or [`Inverse::rejoin`]. One neighbour exchange with clusters, none without.
-    pub fn add_bonds<const N: usize>(&self, constraints: &Constraints, multipliers: [&mut Vec<f64>; N]) {
-        if !self.inverse.is_hybrid() {
-            return;
-        }
-        let mut torn = self.gather.zeros();
-        self.inverse.add_bond_forces(&mut torn);
-        let mut rows = vec![0.0; self.gather.rows()];
-        self.gather.apply(&torn, &mut rows);
+    /// other in the last [`DualOperator::solve`]. Local.
+    pub fn add_bonds<const N: usize>(&self, multipliers: [&mut Vec<f64>; N]) {
+        let Some(hybrid) = &self.hybrid else { return };
         for lambda in multipliers {
-            constraints.add_forces(&rows, |kind| kind == Kind::Gluing, lambda);
+            lambda.iter_mut().zip(hybrid.forces()).for_each(|(l, c)| *l += c);
         }
+    }
+
+    /// Moves the members of clusters to where a displacement keeps them together. Collective.
+    pub fn rejoin(&mut self, u: &mut Torn) {
+        self.hybrid.iter_mut().for_each(|hybrid| hybrid.rejoin(u));
+    }
+
+    /// `z = M r` by a preconditioner of subdomains, see [`Hybrid::precondition`]. Collective.
+    pub fn precondition(&self, r: &[f64], z: &mut [f64], apply: impl FnOnce(&[f64], &mut [f64])) {
+        match &self.hybrid {
+            Some(hybrid) => hybrid.precondition(r, z, apply),
+            None => apply(r, z),
+        }
+    }
+
+    /// Whether there are clusters of several subdomains.
+    pub fn is_hybrid(&self) -> bool {
+        self.hybrid.is_some()
+    }
+
+    /// `torn = K^+ torn`, of clusters if there are any. Collective.
+    pub fn solve(&mut self, torn: &mut Torn) {
+        solve(&mut self.inverse, &mut self.hybrid, torn);
     }
 
     /// Adds to multipliers what no quadratic program sees: what holds the members of clusters together, and what
     /// pinned supports carry, after the displacement `du` under `forces`. The last of the multipliers are in balance.
     pub fn add_hidden(&self, constraints: &Constraints, at: (&Torn, &Torn), [lambda, balanced]: [&mut Vec<f64>; 2]) {
-        self.add_bonds(constraints, [&mut *lambda, &mut *balanced]);
+        self.add_bonds([&mut *lambda, &mut *balanced]);
         self.add_reactions(constraints, at, [lambda, balanced]);
     }
 
@@ -138,7 +138,7 @@ impl<'a> DualOperator<'a> {
             local.fill(0.0);
             self.gather.add_transpose_one(own, 1.0, x, local);
         }
-        self.inverse.solve(&mut self.torn);
+        solve(&mut self.inverse, &mut self.hybrid, &mut self.torn);
         self.gather.apply(&self.torn, y);
     }
 
@@ -146,7 +146,7 @@ impl<'a> DualOperator<'a> {
     pub fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64]) {
         self.applications += 1;
         self.gather.add_transpose(-1.0, x, torn);
-        self.inverse.solve(torn);
+        self.solve(torn);
         self.gather.apply(torn, y);
     }
 
@@ -156,13 +156,20 @@ impl<'a> DualOperator<'a> {
     }
 }
 
+fn solve(inverse: &mut Inverse, hybrid: &mut Option<Hybrid>, torn: &mut Torn) {
+    match hybrid {
+        Some(hybrid) => hybrid.solve(inverse, torn),
+        None => inverse.solve(torn),
+    }
+}
+
 /// One outcome for all ranks: the lowest failing subdomain speaks; ranks that see no failure repeat its number.
-fn agree<T>(outcome: Result<T, NotDefinite>, space: &RowSpace) -> Result<T, Singular> {
+fn agree<T>(outcome: Result<T, NotDefinite>, space: &RowSpace) -> Result<T, NotDefinite> {
     let Some(subdomain) = space.lowest(outcome.as_ref().err().map(|failure| failure.subdomain)) else {
-        return outcome.map_err(Singular::from);
+        return outcome;
     };
     let unknown = NotDefinite { subdomain, pivot: 0, dofs: 0 };
-    Err(outcome.err().filter(|failure| failure.subdomain == subdomain).unwrap_or(unknown).into())
+    Err(outcome.err().filter(|failure| failure.subdomain == subdomain).unwrap_or(unknown))
 }
 
 #[cfg(test)]

@@ -4,9 +4,6 @@
 //! the Cholesky factor of their 3x3 Gram matrix (the inertia tensor of the nodes). Pivots play no part: a face-connected
 //! set of tetrahedra has exactly these modes.
 
-use std::ops::Range;
-
-use crate::decomposition::Subdomain;
 use crate::vector::{cross, difference, dot};
 
 /// Rigid modes of a subdomain, or of a cluster.
@@ -24,8 +21,44 @@ pub struct RigidModes {
 impl RigidModes {
     /// Of the given nodes, which do not lie on one line.
     pub fn new(points: &[[f64; 3]]) -> Self {
-        let (centre, gram) = inertia(points);
-        Self { centre, translation: 1.0 / (points.len() as f64).sqrt(), axes: inverse_cholesky(gram) }
+        let (centre, moments) = inertia(points);
+        Self::of_nodes(points.len() as f64, centre, moments)
+    }
+
+    /// Of so many nodes with this centroid and inertia tensor about it.
+    pub fn of_nodes(count: f64, centre: [f64; 3], moments: [[f64; 3]; 3]) -> Self {
+        Self { centre, translation: 1.0 / count.sqrt(), axes: inverse_cholesky(moments) }
+    }
+
+    /// These modes as sums of those of some of their nodes, `[mode of the part][mode]`.
+    pub fn in_modes_of(&self, part: &Self) -> [[f64; MODES]; MODES] {
+        let mut matrix = [[0.0; MODES]; MODES];
+        let arm = difference(part.centre, self.centre);
+        for (k, axis) in self.axes.iter().enumerate() {
+            matrix[k][k] = self.translation / part.translation;
+            let way = cross(*axis, arm);
+            (0..3).for_each(|a| matrix[a][3 + k] = way[a] / part.translation);
+            // The part's axes are a triangular matrix.
+            for i in (0..3).rev() {
+                let known: f64 = (i + 1..3).map(|j| part.axes[j][i] * matrix[3 + j][3 + k]).sum();
+                matrix[3 + i][3 + k] = (axis[i] - known) / part.axes[i][i];
+            }
+        }
+        matrix
+    }
+
+    /// As numbers, to be sent.
+    pub fn to_numbers(&self) -> [f64; 13] {
+        let mut numbers = [0.0; 13];
+        let all = self.centre.into_iter().chain([self.translation]).chain(self.axes.into_iter().flatten());
+        numbers.iter_mut().zip(all).for_each(|(number, x)| *number = x);
+        numbers
+    }
+
+    /// From such numbers.
+    pub fn from_numbers(numbers: &[f64; 13]) -> Self {
+        let [x, y, z, translation, axes @ ..] = *numbers;
+        Self { centre: [x, y, z], translation, axes: std::array::from_fn(|i| std::array::from_fn(|j| axes[3 * i + j])) }
     }
 
     /// The modes' displacements at a point, `[component][mode]`.
@@ -59,16 +92,6 @@ impl RigidModes {
             }
         }
     }
-}
-
-/// The modes of each cluster, given by its range of own subdomains, for each of its members: orthonormal over all of them.
-pub fn of_clusters(clusters: impl Iterator<Item = Range<usize>>, subdomains: &[Subdomain]) -> Vec<RigidModes> {
-    let mut modes = Vec::with_capacity(subdomains.len());
-    for members in clusters {
-        let points: Vec<[f64; 3]> = subdomains[members.clone()].iter().flat_map(|s| s.points.iter().copied()).collect();
-        modes.resize(members.end, RigidModes::new(&points));
-    }
-    modes
 }
 
 /// The centroid of points and their inertia tensor about it.
@@ -107,6 +130,19 @@ fn inverse_cholesky(gram: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn modes_of_a_whole_are_sums_of_those_of_a_part() {
+        let points = [[1.0, 2.0, 3.0], [4.0, 2.5, 3.0], [1.0, 7.0, 3.5], [1.5, 2.0, 9.0], [-3.0, 0.0, 1.0]];
+        let (whole, part) = (RigidModes::new(&points), RigidModes::new(&points[1..]));
+        let matrix = RigidModes::from_numbers(&whole.to_numbers()).in_modes_of(&part);
+        for (of_whole, of_part) in points.iter().map(|&point| (whole.at(point), part.at(point))) {
+            for (a, k) in (0..3).flat_map(|a| (0..6).map(move |k| (a, k))) {
+                let sum: f64 = (0..6).map(|j| of_part[a][j] * matrix[j][k]).sum();
+                assert!((sum - of_whole[a][k]).abs() < 1e-14);
+            }
+        }
+    }
 
     #[test]
     fn modes_are_orthonormal_rigid_motions() {

@@ -4,13 +4,12 @@
 //! [`kernel`] has the rigid modes, [`factor`] the factors of whole subdomains, [`schur`] those of their interiors with the Schur
 //! complement, [`stock`] the scratch that their solves share. [`tangents`] decides which factors are kept, shared or made
 //! again, from the states that they were made from ([`basis`]). [`refine`] recovers the digits that they lack. [`pinnable`] finds unknowns
-//! that factors may keep at zero. [`hybrid`] joins subdomains to clusters.
+//! that factors may keep at zero.
 //!
 //! All here is local to a rank.
 
 pub mod basis;
 pub mod factor;
-pub mod hybrid;
 pub mod kernel;
 pub mod pinnable;
 pub mod refine;
@@ -22,7 +21,6 @@ use std::rc::Rc;
 
 use self::basis::Bases;
 use self::factor::{Factors, NotDefinite, Symbolic};
-use self::hybrid::Hybrid;
 use self::schur::Schur;
 use self::tangents::{Factorising, Linearisation, Tangents};
 use super::Torn;
@@ -31,11 +29,10 @@ use crate::decomposition::Subdomain;
 use crate::monitor::timing::Timer;
 use crate::sparse::cholesky::Precision;
 
-/// `K^+` of one rank's subdomains, or of their clusters.
+/// `K^+` of one rank's subdomains.
 pub struct Inverse {
     factors: Factors,
     tangents: Tangents,
-    hybrid: Option<Hybrid>,
     /// For each own subdomain, unknowns that its factor may keep at zero ([`pinnable`]).
     pinnable: Vec<Vec<u32>>,
     /// Whether the factor of any subdomain, on any rank, may keep unknowns at zero now.
@@ -43,23 +40,21 @@ pub struct Inverse {
 }
 
 impl Inverse {
-    /// Of subdomains with these analyses, of clusters if there are any. Factors are in single `precision` where a probe lets
+    /// Of subdomains with these analyses. Factors are in single `precision` where a probe lets
     /// them. `twins` numbers subdomains that have congruent ones; of `pinnable` see [`pinnable::unknowns`]. Nothing is factorised
     /// before [`Inverse::update`].
     pub fn new(
         symbolic: Vec<Rc<Symbolic>>,
         precision: Precision,
-        hybrid: Option<Hybrid>,
         twins: Vec<Option<usize>>,
         pinnable: Vec<Vec<u32>>,
     ) -> Self {
         let (factors, tangents) = (Factors::new(symbolic, precision), Tangents::new(twins));
-        Self { factors, tangents, hybrid, pinnable, pins: false }
+        Self { factors, tangents, pinnable, pins: false }
     }
 
     /// Assembles the tangents `K_k` at an iterate and factorises those whose entries changed by more than `left`, relative to
-    /// their diagonal; with them the `interiors` of the preconditioner, if there is one. Clusters follow by
-    /// [`Inverse::update_clusters`]. Returns for each own subdomain whether its tangent is a new one.
+    /// their diagonal; with them the `interiors` of the preconditioner, if there is one. Returns for each own subdomain whether its tangent is a new one.
     ///
     /// # Errors
     /// The first tangent that is singular. Those behind it keep their factors.
@@ -72,15 +67,6 @@ impl Inverse {
     ) -> Result<Vec<bool>, NotDefinite> {
         self.pins = false;
         self.tangents.update(at, left, &mut Factorising { factors: &mut self.factors, schur: interiors, timer })
-    }
-
-    /// Makes the clusters follow the factors of their members.
-    ///
-    /// # Errors
-    /// The first own subdomain of a cluster whose members nothing holds together.
-    pub fn update_clusters(&mut self, timer: &Timer) -> Result<(), usize> {
-        let Some(hybrid) = &mut self.hybrid else { return Ok(()) };
-        timer.time("clusters", || hybrid.update(&mut self.factors))
     }
 
     /// Makes factors again from their former states, to the same bits, in at least this precision.
@@ -100,8 +86,8 @@ impl Inverse {
     }
 
     /// For some weak subdomain on any rank ([`Schur::is_weak`]): gives the preconditioner the `interiors` of own subdomains
-    /// `beside` weak ones as they are now, and pins what supports hold of weak own ones. Without clusters only, where members hold
-    /// each other. With `is_any_weak` false nothing is pinned any more.
+    /// `beside` weak ones as they are now, and pins what supports hold of weak own ones. With `is_any_weak` false nothing is pinned
+    /// any more.
     ///
     /// # Errors
     /// The first block that is singular.
@@ -113,7 +99,7 @@ impl Inverse {
         interiors: &mut Schur,
         timer: &Timer,
     ) -> Result<(), NotDefinite> {
-        self.pins = is_any_weak && self.hybrid.is_none();
+        self.pins = is_any_weak;
         let pinned: Vec<bool> = (0..subdomains.len()).map(|own| self.pins && interiors.is_weak(own)).collect();
         let mut on = Factorising { factors: &mut self.factors, schur: Some(interiors), timer };
         for &own in beside {
@@ -144,37 +130,14 @@ impl Inverse {
         before == Precision::Single
     }
 
-    /// `x = K^+ x`, of clusters if there are any.
+    /// `x = K^+ x`.
     pub fn solve(&mut self, x: &mut Torn) {
-        match &mut self.hybrid {
-            Some(hybrid) => hybrid.solve(&mut self.factors, x),
-            None => self.factors.solve(x),
-        }
-    }
-
-    /// `x = K^+ x` of each subdomain by itself.
-    pub fn solve_each(&mut self, x: &mut Torn) {
         self.factors.solve(x);
     }
 
-    /// Refines `x = K^+ r` of each subdomain by itself, see [`refine::refine`].
+    /// Refines `x = K^+ r`, see [`refine::refine`].
     pub fn refine(&mut self, norm: &dyn Fn(&Torn) -> f64, at: (&Torn, &mut Torn), share: f64) -> (f64, usize) {
         refine::refine(&mut self.factors, &self.tangents.values, norm, at, share)
-    }
-
-    /// Closes the bonds of clusters in a displacement, see [`Hybrid::rejoin`].
-    pub fn rejoin(&mut self, u: &mut Torn) {
-        self.hybrid.iter_mut().for_each(|hybrid| hybrid.rejoin(u));
-    }
-
-    /// Adds the forces by which the members of clusters held each other in the last [`Inverse::solve`] or [`Inverse::rejoin`].
-    pub fn add_bond_forces(&self, torn: &mut Torn) {
-        self.hybrid.iter().for_each(|hybrid| hybrid.add_forces(torn));
-    }
-
-    /// Whether there are clusters of several subdomains.
-    pub fn is_hybrid(&self) -> bool {
-        self.hybrid.is_some()
     }
 
     /// Whether unknowns of any subdomain, on any rank, may be kept at zero now.

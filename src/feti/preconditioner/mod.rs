@@ -9,8 +9,9 @@ use self::deluxe::Deluxe;
 use self::scaling::Scaling;
 use super::Torn;
 use super::dual::gather::Gather;
-use super::dual::operator::{Changes, DualOperator, Singular};
+use super::dual::operator::{Changes, DualOperator};
 use super::dual::space::RowSpace;
+use super::inverse::factor::NotDefinite;
 use super::inverse::schur::Schur;
 use crate::comm::{Comm, Shares};
 use crate::constraint::Constraints;
@@ -85,7 +86,7 @@ impl<'a> Preconditioner<'a> {
         constraints: &Constraints,
         space: &RowSpace,
         timer: &Timer,
-    ) -> Result<(), Singular> {
+    ) -> Result<(), NotDefinite> {
         let Changes { fresh, weak } = changes;
         let stiffness = (0..subdomains.len()).map(|own| operator.inverse.stiffness(own));
         let stiffness = stiffness.map(|(symbolic, values)| (&symbolic.pattern, values));

@@ -13,7 +13,7 @@ fn decompositions_are_checked() {
     refuses(&["decomposition.subdomains=49"], &["decomposition.subdomains = 49", "48 elements"]);
     assert!(one(&["decomposition.subdomains=48"]).is_ok());
     refuses(&["decomposition.cluster=0"], &["decomposition.cluster = 0", "at least 1"]);
-    assert_eq!(one(&["decomposition.cluster=8"]).unwrap().decomposition.cluster, Some(8));
+    assert_eq!(one(&["decomposition.cluster=8"]).unwrap().decomposition.cluster, Some(Groups::Equal(8)));
 }
 
 #[test]

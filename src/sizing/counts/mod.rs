@@ -16,9 +16,9 @@ mod tests;
 use self::parts::Parts;
 use self::structured::Structured;
 use super::memory::{self, Lengths, Memory, SLOT, megabytes};
-use crate::decomposition::{BodyMesh, Cut, bricks, cost, tetrahedra};
+use crate::decomposition::{BodyMesh, Cut, bricks, tetrahedra};
 use crate::element::Kind;
-use crate::model::discrete::{can_be_cut, cut};
+use crate::model::discrete::{can_be_cut, cut, groups};
 use crate::model::meshes;
 use crate::model::meshes::MeshError;
 use crate::record::counts::Sizes;
@@ -155,14 +155,11 @@ impl<'a> Counted<'a> {
     fn parts(&self) -> Vec<Parts> {
         let all = self.tetrahedra();
         let bodies = || self.scene.body.keys().zip(&self.bodies).zip(&self.shapes);
-        let cluster = |subdomains: usize| match self.scene.decomposition.cluster {
-            Some(cluster) => cluster,
-            None => cost::cluster(subdomains, all),
-        };
+        let groups = |subdomains: usize| groups(self.scene, subdomains, all);
         match self.cut {
             Cut::Bricks(cells) => {
                 let count = self.bodies.iter().map(|body| bricks::count(body, cells)).fold(0, usize::saturating_add);
-                let cluster = cluster(count);
+                let groups = groups(count);
                 // Boxes of one kind of elements are alike.
                 let mut known: Vec<(Kind, Lengths)> = Vec::new();
                 let mut lengths = |kind: Kind| match known.iter().find(|(of, _)| *of == kind) {
@@ -174,17 +171,17 @@ impl<'a> Counted<'a> {
                 };
                 let of = |((name, body), shape): ((&String, &BodyMesh), &Structured)| {
                     let touching = shape.boxes_on(cells, &self.touching(name));
-                    Parts::boxes(self.scene, body, (cells, lengths(body.kind)), cluster, touching)
+                    Parts::boxes(self.scene, body, (cells, lengths(body.kind)), &groups, touching)
                 };
                 bodies().map(of).collect()
             }
             Cut::Parts(parts) => {
-                let cluster = cluster(parts) as f64;
+                let groups = groups(parts);
                 let of = |((name, body), shape): ((&String, &BodyMesh), &Structured)| {
                     let share = tetrahedra(std::slice::from_ref(body)) as f64 / all as f64;
                     let parts = (parts as f64 * share).max(1.0);
                     let touching = shape.on(&self.touching(name));
-                    Parts::pieces(self.scene, body, shape.extent(), [parts, cluster], touching as f64)
+                    Parts::pieces(self.scene, body, shape.extent(), (parts, &groups), touching as f64)
                 };
                 bodies().map(of).collect()
             }

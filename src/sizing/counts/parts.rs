@@ -2,7 +2,6 @@
 
 use super::local;
 use crate::decomposition::{BodyMesh, bricks};
-use crate::feti::inverse::kernel::MODES;
 use crate::scene::Scene;
 use crate::sizing::memory;
 use crate::sizing::memory::Lengths;
@@ -37,52 +36,50 @@ impl Parts {
         scene: &Scene,
         body: &BodyMesh,
         (cells, lengths): ([usize; 3], Lengths),
-        cluster: usize,
+        groups: &[usize],
         touching: u64,
     ) -> Self {
         let along = bricks::along(body, cells);
         let count: u64 = along.iter().map(|&n| n as u64).product();
-        let parts = bricks::parts(along, cluster);
-        let clusters: u64 = parts.iter().map(|&n| n as u64).product();
+        let top = groups.iter().fold(along, |grid, &size| bricks::parts(grid, size));
+        let clusters: u64 = top.iter().map(|&n| n as u64).product();
         let of_box: u64 = 3 * cells.iter().map(|&n| (body.kind.degree() * n + 1) as u64).product::<u64>();
         let unknowns = count * of_box;
-        let members = [0, 1, 2].map(|a| along[a] as f64 / parts[a] as f64);
-        let numbers =
-            count as f64 * memory::of_subdomain(scene, lengths, true) + clusters as f64 * bonds(members, of_box as f64);
+        let numbers = count as f64 * memory::of_subdomain(scene, lengths, true);
         let slots = SLOTS * (unknowns - 3 * body.counts().nodes) as f64;
         Self { count, clusters, touching, unknowns, slots, numbers, factor: lengths.factor }
     }
 
-    /// As many parts as are asked for, in clusters of so many, of a body with so many nodes along its axes, and on its
+    /// As many parts as are asked for, in groups of so many, of a body with so many nodes along its axes, and on its
     /// contact surfaces.
-    pub fn pieces(scene: &Scene, body: &BodyMesh, extent: [f64; 3], [count, cluster]: [f64; 2], touching: f64) -> Self {
+    pub fn pieces(
+        scene: &Scene,
+        body: &BodyMesh,
+        extent: [f64; 3],
+        (count, groups): (f64, &[usize]),
+        touching: f64,
+    ) -> Self {
         let nodes = body.counts().nodes as f64;
         let along = boxes_along(extent, count);
         let product = |x: [f64; 3]| x.iter().product::<f64>();
         let glued = RAGGED * (product([0, 1, 2].map(|a| extent[a] + along[a] - 1.0)) - product(extent));
         let of_piece = (nodes + glued) / count;
         let lengths = local::of_nodes(body.kind, of_piece);
-        let members = [cluster.cbrt(); 3];
-        let clusters = (count / cluster).ceil();
-        let bonds = if cluster > 1.0 { clusters * bonds(members, 3.0 * of_piece) } else { 0.0 };
+        let (mut clusters, mut numbers) = (count, count * memory::of_subdomain(scene, lengths, false));
+        for &size in groups {
+            clusters = (clusters / size as f64).ceil();
+            numbers += clusters * memory::of_group(size as f64);
+        }
         Self {
             count: count.round() as u64,
             clusters: clusters as u64,
             touching: (touching / of_piece.powf(2.0 / 3.0)).ceil().min(count.round()) as u64,
             unknowns: 3 * (body.counts().nodes + glued as u64),
             slots: 3.0 * SLOTS * glued,
-            numbers: count * memory::of_subdomain(scene, lengths, false) + bonds,
+            numbers,
             factor: lengths.factor,
         }
     }
-}
-
-/// Numbers that a cluster of so many members along each axis takes besides (see [`crate::feti::inverse::hybrid::numbers`]).
-fn bonds(along: [f64; 3], unknowns: f64) -> f64 {
-    let members: f64 = along.iter().product();
-    let modes = MODES as f64;
-    let rows = modes * along.iter().map(|n| members - members / n).sum::<f64>();
-    if rows == 0.0 { 0.0 } else { 2.0 * rows * unknowns + rows.powi(2) + (modes * members).powi(2) }
 }
 
 /// So many boxes, along each axis, as near to cubes as a body of so many nodes lets them.

@@ -171,7 +171,7 @@ fn twins_get_what_they_would_get_alone_and_the_same_bits_beside_any_others() {
 fn pinned_unknowns_stay_and_the_others_give_way_as_without_them() {
     on_ranks(&two_bricks_by_metis(7), 1, |setup| {
         let (mut factors, stiffnesses) = setup.factors();
-        let pinned = pinnable::unknowns(&setup.discrete.constraints, setup.subdomains(), &setup.modes);
+        let pinned = pinnable::unknowns(&setup.discrete.constraints, setup.subdomains(), setup.modes());
         let mut forces = setup.displacements(3);
         let before = forces.clone();
         let own = (0..pinned.len()).find(|&own| !pinned[own].is_empty()).expect("a support holds a part");
@@ -205,7 +205,7 @@ fn supports_hold_the_parts_to_which_they_leave_no_rigid_motion() {
     for (scene, pinned_at_all) in [(two_bricks(&[]), true), (two_bricks_by_metis(7), true), (sliding, false)] {
         on_ranks(&scene, 1, |setup| {
             let (factors, stiffnesses) = setup.factors();
-            let pinned = pinnable::unknowns(&setup.discrete.constraints, setup.subdomains(), &setup.modes);
+            let pinned = pinnable::unknowns(&setup.discrete.constraints, setup.subdomains(), setup.modes());
             assert_eq!(pinned.iter().any(|pinned| !pinned.is_empty()), pinned_at_all);
             for (own, pinned) in pinned.iter().enumerate() {
                 let is_support = |row: u32| matches!(setup.rows()[row as usize].kind, Kind::Support { .. });

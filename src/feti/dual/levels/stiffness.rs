@@ -1,0 +1,213 @@
+//! `G G'` of the members of each group by the gluing rows between them, and its inverse.
+//!
+//! It leaves the rigid motions of the group as a whole. So the first member is tied: `(G G')^+` gives it no motion, which is exact
+//! for forces that are in balance over the group.
+
+use std::collections::{BTreeMap, HashMap};
+use std::rc::Rc;
+
+use faer::linalg::solvers::DenseSolveCore;
+use faer::{Mat, Side};
+
+use super::{Motions, Tree, gluing};
+use crate::constraint::Constraints;
+use crate::decomposition::{Clusters, Subdomain};
+use crate::feti::dual::gather::Gather;
+use crate::feti::inverse::kernel::{MODES, RigidModes};
+use crate::simd::vectorised;
+
+/// `G` of a row, by members.
+type OfRow = Vec<(u32, [f64; MODES])>;
+/// Blocks between two members.
+type Blocks = BTreeMap<(u32, u32), [f64; MODES * MODES]>;
+
+/// `(G G')^+` of all members but the first, by columns.
+pub struct Inverse {
+    /// Number of unknowns: six for each member but the first.
+    pub length: usize,
+    columns: Vec<f64>,
+}
+
+/// The inverses of the groups of one level that are at home here; groups with equal blocks share one. `None` for a group whose
+/// members something leaves free. Collective.
+pub fn inverses(
+    level: usize,
+    (clusters, tree, motions): (&Clusters, &Tree, &Motions),
+    subdomains: &[Subdomain],
+    constraints: &Constraints,
+    gather: &Gather,
+) -> Vec<Option<Rc<Inverse>>> {
+    let mut known: HashMap<Vec<u64>, Option<Rc<Inverse>>> = HashMap::new();
+    let blocks = blocks(level, (clusters, tree, motions), subdomains, constraints, gather);
+    let of_group = |(members, blocks): (&std::ops::Range<usize>, &Blocks)| {
+        let entry = |(&(row, column), block): (&(u32, u32), &[f64; MODES * MODES])| {
+            [u64::from(row) << 32 | u64::from(column)].into_iter().chain(block.map(f64::to_bits)).collect::<Vec<_>>()
+        };
+        let key: Vec<u64> = [members.len() as u64].into_iter().chain(blocks.iter().flat_map(entry)).collect();
+        known.entry(key).or_insert_with(|| Inverse::new(members.len(), blocks).map(Rc::new)).clone()
+    };
+    tree.members(level).iter().zip(&blocks).map(of_group).collect()
+}
+
+/// Lower blocks of the groups at home here. A row counts for the first subdomain that it is of.
+fn blocks(
+    level: usize,
+    (clusters, tree, motions): (&Clusters, &Tree, &Motions),
+    subdomains: &[Subdomain],
+    constraints: &Constraints,
+    gather: &Gather,
+) -> Vec<Blocks> {
+    let first = subdomains.first().map_or(0, |s| s.id);
+    let modes = modes_of_nodes(level - 1, motions, subdomains);
+    let mut rows: Vec<Vec<(u32, OfRow)>> = vec![Vec::new(); subdomains.len()];
+    // The order of rows depends on what is outside of the group, that of nodes does not.
+    let mut dofs = vec![0; constraints.rows.len()];
+    for entry in (0..subdomains.len()).flat_map(|own| gather.entries(own)) {
+        if entry.slot == constraints.slot_begin[entry.row as usize] {
+            dofs[entry.row as usize] = entry.dof;
+        }
+    }
+    gather.moved(modes, |row, values| {
+        let slots = &constraints.slot_subdomain[constraints.slots(row)];
+        let own = (slots[0] as usize).checked_sub(first).filter(|&own| own < subdomains.len());
+        if let Some(own) = own.filter(|_| gluing::level(clusters, constraints, row) == Some(level)) {
+            let of_row = of_groups(clusters, level - 1, slots, values);
+            rows[own].push((dofs[row], of_row));
+        }
+    });
+    let mut outgoing = vec![Vec::new(); tree.comm().size()];
+    for (own, mut rows) in rows.into_iter().enumerate() {
+        rows.sort_by_key(|row| row.0);
+        let mut blocks = Blocks::new();
+        for (_, of_row) in &rows {
+            for (at, (column, b)) in of_row.iter().enumerate() {
+                for (row, a) in &of_row[at..] {
+                    let block = blocks.entry((*row, *column)).or_insert([0.0; MODES * MODES]);
+                    for (line, a) in block.as_chunks_mut::<MODES>().0.iter_mut().zip(a) {
+                        line.iter_mut().zip(b).for_each(|(x, b)| *x += a * b);
+                    }
+                }
+            }
+        }
+        let group = clusters.group(level, first + own);
+        let to = &mut outgoing[tree.home(clusters.begin(level, group))];
+        for ((row, column), block) in blocks {
+            to.extend([u64::from(row), u64::from(column)]);
+            to.extend(block.map(f64::to_bits));
+        }
+    }
+    let groups = tree.groups(level);
+    let mut sums = vec![Blocks::new(); groups.len()];
+    for message in tree.comm().all_to_all(outgoing) {
+        for &[row, column, ref block @ ..] in message.as_chunks::<{ 2 + MODES * MODES }>().0 {
+            let group = clusters.group(level, clusters.begin(level - 1, row as usize));
+            let begin = clusters.children(level, group).start as u64;
+            let at = ((row - begin) as u32, (column - begin) as u32);
+            let sum = sums[group - groups.start].entry(at).or_insert([0.0; MODES * MODES]);
+            sum.iter_mut().zip(block).for_each(|(sum, bits)| *sum += f64::from_bits(*bits));
+        }
+    }
+    sums
+}
+
+/// The modes of the groups of a level at the nodes of own subdomains, `[component][mode]`. Congruent groups have equal bits on
+/// the lowest level, where all depends on shapes alone.
+fn modes_of_nodes<'s>(
+    level: usize,
+    motions: &'s Motions,
+    subdomains: &'s [Subdomain],
+) -> impl Fn(usize, usize) -> [[f64; MODES]; 3] + 's {
+    let shapes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.shape)).collect();
+    move |own, node| match level {
+        0 => shapes[own].at(subdomains[own].shape[node]),
+        _ => motions.levels[level][own].at(subdomains[own].points[node]),
+    }
+}
+
+/// Sums of the slots of each group of a level. Subdomains ascend.
+fn of_groups(clusters: &Clusters, level: usize, slots: &[u32], values: &[[f64; MODES]]) -> OfRow {
+    let mut of_row = OfRow::new();
+    for (&subdomain, six) in slots.iter().zip(values) {
+        let group = clusters.group(level, subdomain as usize) as u32;
+        match of_row.last_mut() {
+            Some((last, sum)) if *last == group => sum.iter_mut().zip(six).for_each(|(sum, x)| *sum += x),
+            _ => of_row.push((group, *six)),
+        }
+    }
+    of_row
+}
+
+/// The diagonal blocks of `G G'` of the groups of a level, by the equalities of higher levels, that are at home here. Collective.
+pub fn diagonal(
+    level: usize,
+    (clusters, tree, motions): (&Clusters, &Tree, &Motions),
+    subdomains: &[Subdomain],
+    constraints: &Constraints,
+    gather: &Gather,
+) -> Vec<[[f64; MODES]; MODES]> {
+    let first = subdomains.first().map_or(0, |s| s.id);
+    let mut blocks = vec![[0.0; MODES * MODES]; subdomains.len()];
+    gather.moved(modes_of_nodes(level, motions, subdomains), |row, values| {
+        if gluing::level(clusters, constraints, row).is_none_or(|of_row| of_row <= level) {
+            return;
+        }
+        let slots = &constraints.slot_subdomain[constraints.slots(row)];
+        // A row counts for the first subdomain of the group that it is of.
+        let mut firsts =
+            slots.chunk_by(|&a, &b| clusters.group(level, a as usize) == clusters.group(level, b as usize));
+        for (_, six) in of_groups(clusters, level, slots, values) {
+            let of = firsts.next().map_or(usize::MAX, |slots| slots[0] as usize);
+            let Some(block) = of.checked_sub(first).and_then(|own| blocks.get_mut(own)) else { continue };
+            for (line, a) in block.as_chunks_mut::<MODES>().0.iter_mut().zip(&six) {
+                line.iter_mut().zip(&six).for_each(|(x, b)| *x += a * b);
+            }
+        }
+    });
+    let sums = tree.sum(level, blocks.as_flattened(), MODES * MODES);
+    sums.chunks_exact(MODES * MODES)
+        .map(|block| std::array::from_fn(|i| std::array::from_fn(|j| block[MODES * i + j])))
+        .collect()
+}
+
+impl Inverse {
+    /// Of so many members with these lower blocks; `None` if something moves freely.
+    fn new(members: usize, blocks: &Blocks) -> Option<Self> {
+        let length = MODES * (members - 1);
+        let mut matrix = Mat::zeros(length, length);
+        for (&(row, column), block) in blocks.iter().filter(|(place, _)| place.1 > 0) {
+            let (row, column) = (MODES * (row as usize - 1), MODES * (column as usize - 1));
+            for (k, x) in block.iter().enumerate() {
+                matrix[(row + k / MODES, column + k % MODES)] = *x;
+            }
+        }
+        let largest = (0..length).map(|k| matrix[(k, k)]).fold(0.0, f64::max);
+        let factor = matrix.llt(Side::Lower).ok()?;
+        let inverse = factor.inverse();
+        let columns: Vec<f64> =
+            (0..length).flat_map(|j| (0..length).map(move |i| (i, j))).map(|at| inverse[at]).collect();
+        let is_firm = (0..length).all(|k| columns[length * k + k] * largest < 1.0 / LOOSE);
+        is_firm.then_some(Self { length, columns })
+    }
+
+    /// Its product with up to [`TOGETHER`] vectors; the bits of each do not depend on the others.
+    pub fn multiply(&self, x: &[[f64; TOGETHER]]) -> Vec<[f64; TOGETHER]> {
+        let mut y = vec![[0.0; TOGETHER]; self.length];
+        vectorised(
+            (&self.columns[..], x, &mut y[..]),
+            #[inline(always)]
+            |(columns, x, y)| {
+                for (column, x) in columns.chunks_exact(y.len().max(1)).zip(x) {
+                    for (y, a) in y.iter_mut().zip(column) {
+                        (0..TOGETHER).for_each(|k| y[k] += a * x[k]);
+                    }
+                }
+            },
+        );
+        y
+    }
+}
+
+/// Members that move by more than the inverse of this, relative to what holds them, are loose.
+const LOOSE: f64 = 1e-10;
+/// Vectors that are multiplied together.
+pub const TOGETHER: usize = 8;
