@@ -9,6 +9,8 @@
 //! It does not know subdomains beyond that: ranks own consecutive blocks of them, so rank order is subdomain order.
 
 pub mod agree;
+pub mod exact;
+pub mod meeting;
 pub mod solo;
 pub mod threads;
 pub mod world;
@@ -124,6 +126,12 @@ pub fn from_root(comm: &dyn Comm, mine: Vec<u64>) -> Vec<u64> {
 /// Integers of all ranks in rank order; lengths may differ.
 pub fn all_gather_u64(comm: &dyn Comm, mine: &[u64]) -> Vec<u64> {
     comm.all_to_all(vec![mine.to_vec(); comm.size()]).concat()
+}
+
+/// Sums of counts over all ranks.
+pub fn sums<const N: usize>(comm: &dyn Comm, mine: [u64; N]) -> [u64; N] {
+    let all = all_gather_u64(comm, &mine);
+    std::array::from_fn(|k| all.iter().skip(k).step_by(N).sum())
 }
 
 /// Texts of all ranks in rank order.

@@ -7,10 +7,10 @@
 use super::{Kind, Row, Term};
 use crate::decomposition::{Clusters, InterfaceNode};
 
-/// The `3 (m - 1)` gluing rows of a node with `m` copies, given the stiffness of all subdomains.
-pub(super) fn rows(node: &InterfaceNode, clusters: &Clusters, stiffness: &[f64]) -> Vec<Row> {
+/// The `3 (m - 1)` gluing rows of a node with `m` copies, given the stiffness of subdomains.
+pub(super) fn rows(node: &InterfaceNode, clusters: &Clusters, stiffness: impl Fn(u32) -> f64) -> Vec<Row> {
     let mut copies = node.copies.clone();
-    copies.sort_by(|&a, &b| stiffness[b as usize].total_cmp(&stiffness[a as usize]));
+    copies.sort_by(|&a, &b| stiffness(b).total_cmp(&stiffness(a)));
     let of = |copy: u32| clusters.of(copy as usize);
     let stiffest: Vec<usize> = copies.iter().map(|&copy| of(copy)).collect();
     copies.sort_by_key(|&copy| stiffest.iter().position(|&cluster| cluster == of(copy)));
@@ -49,7 +49,7 @@ mod tests {
         let node = InterfaceNode { node: 7, copies: vec![0, 1, 2, 5, 6, 8], surfaces: Vec::new() };
         let (clusters, _) = Clusters::new(Shares(vec![3]), &[3, 4, 2]);
         for (clusters, leaving) in [(Clusters::new(Shares(vec![9]), &[1; 9]).0, 15), (clusters, 6)] {
-            let rows = rows(&node, &clusters, &[1.0, 4.0, 1.0, 1.0, 1.0, 2.0, 8.0, 1.0, 1.0]);
+            let rows = rows(&node, &clusters, |s| [1.0, 4.0, 1.0, 1.0, 1.0, 2.0, 8.0, 1.0, 1.0][s as usize]);
             assert_eq!(rows.len(), 15);
             for (i, a) in rows.iter().enumerate() {
                 assert!(a.terms.iter().map(|t| t.value).sum::<f64>().abs() < 1e-15);

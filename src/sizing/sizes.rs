@@ -67,7 +67,7 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
     let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
     Memory {
         subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0],
-        rank_mb: memory::of_rank_mb(subdomains, clusters, contacts.pairs.len() as f64, largest),
+        rank_mb: memory::of_rank_mb(subdomains, clusters, contacts.pairs.total() as f64, largest),
         cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)),
     }
 }
