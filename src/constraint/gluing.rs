@@ -47,8 +47,8 @@ mod tests {
     #[test]
     fn rows_are_orthonormal_and_few_of_them_leave_a_cluster() {
         let node = InterfaceNode { node: 7, copies: vec![0, 1, 2, 5, 6, 8], surfaces: Vec::new() };
-        let (clusters, _) = Clusters::new(Shares(vec![3]), &[3, 4, 2]);
-        for (clusters, leaving) in [(Clusters::new(Shares(vec![9]), &[1; 9]).0, 15), (clusters, 6)] {
+        let (clusters, _) = Clusters::new(Shares::new(vec![3]), &[3, 4, 2]);
+        for (clusters, leaving) in [(Clusters::new(Shares::new(vec![9]), &[1; 9]).0, 15), (clusters, 6)] {
             let rows = rows(&node, &clusters, |s| [1.0, 4.0, 1.0, 1.0, 1.0, 2.0, 8.0, 1.0, 1.0][s as usize]);
             assert_eq!(rows.len(), 15);
             for (i, a) in rows.iter().enumerate() {

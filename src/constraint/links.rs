@@ -2,8 +2,8 @@
 //!
 //! A block is a connected component of nodes ([`super`]), and is held whole by every rank that touches it. Ranks find the name of
 //! each component together, its lowest node, then who else touches it, and send each other what they have of it. Where meshes match a
-//! component has the few ranks around a node. Where they do not, all rows of the contact are one, and every rank at the contact
-//! holds them: `(B B')^-1` of these couples all of them ([`crate::feti::dual::coupling`]).
+//! component has the few ranks around a node. Where they do not, or on quadratic faces, conditions share nodes: all rows of the
+//! contact are one, and every rank at the contact holds them: `(B B')^-1` couples all of them ([`crate::feti::dual::coupling`]).
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

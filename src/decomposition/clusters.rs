@@ -26,7 +26,7 @@ impl Clusters {
             first += count;
             of_rank
         });
-        let subdomains = Shares(subdomains.collect());
+        let subdomains = Shares::new(subdomains.collect());
         (Self { shares, begins }, subdomains)
     }
 
@@ -63,14 +63,14 @@ mod tests {
 
     #[test]
     fn clusters_are_consecutive_and_whole_on_a_rank() {
-        let (clusters, subdomains) = Clusters::new(Shares(vec![2, 0, 1]), &[3, 2, 4]);
+        let (clusters, subdomains) = Clusters::new(Shares::new(vec![2, 0, 1]), &[3, 2, 4]);
         assert_eq!(subdomains.0, [5, 0, 4]);
         assert_eq!((0..9).map(|s| clusters.of(s)).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 2, 2, 2, 2]);
         assert_eq!((0..3).map(|c| clusters.first(c)).collect::<Vec<_>>(), [0, 3, 5]);
         let of_ranks = (0..3).flat_map(|rank| clusters.of_rank(rank).map(move |members| (rank, members)));
         assert!(of_ranks.eq([(0, 0..3), (0, 3..5), (2, 0..4)]));
         assert!(!clusters.are_single());
-        let (singles, subdomains) = Clusters::new(Shares(vec![1, 2]), &[1; 3]);
+        let (singles, subdomains) = Clusters::new(Shares::new(vec![1, 2]), &[1; 3]);
         assert!(singles.are_single() && singles.total() == 3 && singles.of(2) == 2);
         assert_eq!(subdomains.0, [1, 2]);
     }

@@ -2,7 +2,8 @@
 
 use std::rc::Rc;
 
-use super::memory::{self, Lengths, Memory, PROCESS_MB, SLOT};
+use super::held::is_coupled;
+use super::memory::{Held, Lengths, Memory, Numbers, PROCESS_MB};
 use crate::comm::{Comm, Shares, maximum, ordered_sum};
 use crate::constraint::Kind;
 use crate::decomposition::Cut;
@@ -58,16 +59,25 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
         Lengths { factor, matrix, unknowns }
     };
     let lengths: Vec<Lengths> = analyse(&decomposition.subdomains).iter().map(lengths).collect();
-    let numbers: f64 = lengths.iter().map(|&lengths| memory::of_subdomain(scene, lengths, is_box)).sum();
+    let mut numbers = Numbers::default();
+    lengths.iter().for_each(|&lengths| numbers += Numbers::of_subdomain(scene, lengths, is_box));
     let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
     let clusters = decomposition.clusters.of_rank(comm.rank()).filter(|members| members.len() > 1);
     let bonds: f64 = clusters.map(|members| hybrid::numbers(&decomposition.subdomains[members]) as f64).sum();
-    let slots = SLOT * constraints.slot_subdomain.len() as f64;
-    let mine = memory::megabytes(8.0 * (numbers + bonds + slots));
+    numbers += Numbers::of_bonds(bonds);
+    numbers += Numbers::of_slots(constraints.slot_subdomain.len() as f64);
+    let all = ordered_sum(comm, &Shares::new(vec![1; comm.size()]), &numbers.0, numbers.0.len());
+    let coupled = scene.contact.values().zip(&contacts.rows);
+    let coupled = coupled.filter(|(contact, row)| is_coupled(scene, contact, row.rule != "mortar"));
+    let coupled = coupled.map(|(_, row)| row.conditions as f64).sum::<f64>();
     let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
-    Memory {
-        subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0],
-        rank_mb: memory::of_rank_mb(subdomains, clusters, contacts.pairs.total() as f64, largest),
-        cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)),
-    }
+    let held = Held {
+        numbers: Numbers(std::array::from_fn(|k| all[k])),
+        subdomains,
+        clusters,
+        conditions: [contacts.pairs.total() as f64 - coupled, coupled],
+        surfaces: contacts.surfaces.len() as f64,
+        largest,
+    };
+    Memory { items: held.items(), cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)) }
 }

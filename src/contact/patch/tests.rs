@@ -71,7 +71,8 @@ fn ranks_find_the_conditions_of_the_whole_surfaces_bit_by_bit_and_know_those_of_
                 assert!(contacts.masters.iter().eq(masters), "{number}: {ranks} ranks");
                 contacts.pairs.known()
             });
-            assert!(ranks < 9 || rule == Rule::Mortar || found.iter().any(|known| *known < expected.pairs.len()));
+            // Conditions that share nodes are in one block: of quadratic faces, and where meshes do not match.
+            assert!(ranks < 9 || number > 2 || found.iter().any(|known| *known < expected.pairs.len()));
         }
     }
 }

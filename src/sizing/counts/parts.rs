@@ -4,8 +4,7 @@ use super::local;
 use crate::decomposition::{BodyMesh, bricks};
 use crate::feti::inverse::kernel::MODES;
 use crate::scene::Scene;
-use crate::sizing::memory;
-use crate::sizing::memory::Lengths;
+use crate::sizing::memory::{Lengths, Numbers};
 
 /// Interface nodes of compact parts to those of boxes.
 const RAGGED: f64 = 1.15;
@@ -26,7 +25,7 @@ pub(super) struct Parts {
     /// Slots of gluing rows.
     pub slots: f64,
     /// Numbers that they hold while solving.
-    pub numbers: f64,
+    pub numbers: Numbers,
     /// Numbers in the factor of one.
     pub factor: f64,
 }
@@ -47,8 +46,8 @@ impl Parts {
         let of_box: u64 = 3 * cells.iter().map(|&n| (body.kind.degree() * n + 1) as u64).product::<u64>();
         let unknowns = count * of_box;
         let members = [0, 1, 2].map(|a| along[a] as f64 / parts[a] as f64);
-        let numbers =
-            count as f64 * memory::of_subdomain(scene, lengths, true) + clusters as f64 * bonds(members, of_box as f64);
+        let mut numbers = Numbers::of_subdomain(scene, lengths, true).times(count as f64);
+        numbers += Numbers::of_bonds(clusters as f64 * bonds(members, of_box as f64));
         let slots = SLOTS * (unknowns - 3 * body.counts().nodes) as f64;
         Self { count, clusters, touching, unknowns, slots, numbers, factor: lengths.factor }
     }
@@ -64,14 +63,15 @@ impl Parts {
         let lengths = local::of_nodes(body.kind, of_piece);
         let members = [cluster.cbrt(); 3];
         let clusters = (count / cluster).ceil();
-        let bonds = if cluster > 1.0 { clusters * bonds(members, 3.0 * of_piece) } else { 0.0 };
+        let mut numbers = Numbers::of_subdomain(scene, lengths, false).times(count);
+        numbers += Numbers::of_bonds(if cluster > 1.0 { clusters * bonds(members, 3.0 * of_piece) } else { 0.0 });
         Self {
             count: count.round() as u64,
             clusters: clusters as u64,
             touching: (touching / of_piece.powf(2.0 / 3.0)).ceil().min(count.round()) as u64,
             unknowns: 3 * (body.counts().nodes + glued as u64),
             slots: 3.0 * SLOTS * glued,
-            numbers: count * memory::of_subdomain(scene, lengths, false) + bonds,
+            numbers,
             factor: lengths.factor,
         }
     }
