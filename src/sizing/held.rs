@@ -113,6 +113,13 @@ mod tests {
                 assert!(total(&large) > total(&small));
             }
         }
+        for ranks in RANKS {
+            let memory = |comm: &dyn crate::comm::Comm| {
+                let discrete = discretise(&small, comm).expect("the scene has a discrete problem");
+                sizing::memory(&small, &discrete, comm)
+            };
+            assert!(threads::run(ranks, memory).iter().all(|found| *found == built(&small)), "whoever asks");
+        }
         let mortar = built(&not_matching(&[]));
         assert!(mortar.items.iter().any(|item| item.name == GROWING[0] && item.everywhere > 0.0));
     }

@@ -4,7 +4,8 @@ use std::rc::Rc;
 
 use super::held::is_coupled;
 use super::memory::{Held, Lengths, Memory, Numbers, PROCESS_MB};
-use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use crate::comm::exact::exact_sums;
+use crate::comm::{Comm, maximum};
 use crate::constraint::Kind;
 use crate::decomposition::Cut;
 use crate::feti::dual::space::RowSpace;
@@ -59,20 +60,24 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
         Lengths { factor, matrix, unknowns }
     };
     let lengths: Vec<Lengths> = analyse(&decomposition.subdomains).iter().map(lengths).collect();
-    let mut numbers = Numbers::default();
-    lengths.iter().for_each(|&lengths| numbers += Numbers::of_subdomain(scene, lengths, is_box));
-    let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
+    let of_subdomains = lengths.iter().map(|&lengths| Numbers::of_subdomain(scene, lengths, is_box));
     let clusters = decomposition.clusters.of_rank(comm.rank()).filter(|members| members.len() > 1);
-    let bonds: f64 = clusters.map(|members| hybrid::numbers(&decomposition.subdomains[members]) as f64).sum();
-    numbers += Numbers::of_bonds(bonds);
-    numbers += Numbers::of_slots(constraints.slot_subdomain.len() as f64);
-    let all = ordered_sum(comm, &Shares::new(vec![1; comm.size()]), &numbers.0, numbers.0.len());
+    let bonds =
+        clusters.map(|members| hybrid::numbers(&decomposition.subdomains[members]) as f64).map(Numbers::of_bonds);
+    // Each block counts once, where its lowest subdomain is.
+    let blocks = constraints.blocks.iter().zip(&constraints.block_subdomains);
+    let owned = blocks.filter(|(_, subdomains)| decomposition.own_index(subdomains[0]).is_some());
+    let slots = owned.map(|(rows, _)| constraints.slot_begin[rows.end] - constraints.slot_begin[rows.start]);
+    let slots = slots.map(|slots| Numbers::of_slots(slots.into()));
+    let rows: Vec<_> = of_subdomains.chain(bonds).chain(slots).map(|numbers| numbers.0).collect();
+    let numbers = Numbers(exact_sums(comm, &rows));
+    let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
     let coupled = scene.contact.values().zip(&contacts.rows);
     let coupled = coupled.filter(|(contact, row)| is_coupled(scene, contact, row.rule != "mortar"));
     let coupled = coupled.map(|(_, row)| row.conditions as f64).sum::<f64>();
     let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
     let held = Held {
-        numbers: Numbers(std::array::from_fn(|k| all[k])),
+        numbers,
         subdomains,
         clusters,
         conditions: [contacts.pairs.total() as f64 - coupled, coupled],
