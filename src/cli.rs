@@ -242,6 +242,6 @@ fn describe_run(summary: &mut Summary, source: &Source, comm: &dyn Comm) {
     summary.level = source.level;
     summary.ranks = comm.size();
     let mine = peak_rss_mb().unwrap_or(f64::NAN);
-    summary.peak_rss_mb = Some(ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0]);
+    summary.peak_rss_mb = Some(ordered_sum(comm, &Shares::new(vec![1; comm.size()]), &[mine], 1)[0]);
     summary.peak_rss_mb_max = Some(maximum(comm, &[mine])[0]);
 }

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::room::Room;
-use super::{Failure, Source, describe_run, find};
+use super::{Failure, Source, describe_run, find, values};
 use crate::comm::Comm;
 use crate::model;
 use crate::monitor::Monitor;
@@ -25,6 +25,9 @@ use crate::sizing::memory::Memory;
 pub struct Check {
     #[command(flatten)]
     source: Source,
+    /// Tell what each of so many ranks would hold, item by item.
+    #[arg(long, value_name = "N", value_parser = values::ranks, allow_negative_numbers = true)]
+    ranks: Option<usize>,
 }
 
 /// Scenes of more tetrahedra are not built.
@@ -59,12 +62,17 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
     contacts.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
     reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
     monitor.event(&Event::Memory { megabytes, available_mb });
+    let held = arguments.ranks.map(|ranks| (ranks, memory.held(ranks)));
+    held.iter().for_each(|(ranks, rows)| monitor.event(&Event::Held { ranks: *ranks, rows: rows.clone() }));
     warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
     if let Some(file) = &source.summary {
         let mut summary = Summary { sizes, warnings, contacts, title: scene.title.clone(), ..Summary::default() };
         summary.memory_estimate_mb = Some(megabytes);
         summary.memory_available_mb = available_mb;
         summary.mesh_reading_mb = reading_mb;
+        if let Some((ranks, rows)) = held {
+            (summary.memory_ranks, summary.memory_of_rank) = (Some(ranks), rows);
+        }
         describe_run(&mut summary, source, comm);
         results::write_json(comm, file, &summary)?;
     }

@@ -12,6 +12,12 @@ pub(super) fn level(text: &str) -> Result<usize, String> {
     level.ok_or_else(|| "levels start at 1, and level n has n times the cells per edge".into())
 }
 
+/// Of `--ranks`.
+pub(super) fn ranks(text: &str) -> Result<usize, String> {
+    let ranks = text.parse().ok().filter(|ranks| *ranks > 0);
+    ranks.ok_or_else(|| "a run has one rank at least".into())
+}
+
 /// Of `--set`.
 pub(super) fn change(text: &str) -> Result<String, String> {
     scene::well_formed(text).map(|()| text.to_owned())

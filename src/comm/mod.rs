@@ -9,8 +9,12 @@
 //! It does not know subdomains beyond that: ranks own consecutive blocks of them, so rank order is subdomain order.
 
 pub mod agree;
+pub mod exact;
+pub mod meeting;
 pub mod solo;
 pub mod threads;
+#[cfg(test)]
+pub mod watched;
 pub mod world;
 
 /// Collective and neighbour communication of one rank. All methods but [`Comm::rank`] and [`Comm::size`] are
@@ -45,31 +49,35 @@ pub trait Comm {
 /// MPI's own handle of a communicator.
 pub type RawMpi = mpi::ffi::MPI_Comm;
 
-/// How many items (subdomains) each rank owns: consecutive blocks, in rank order.
+/// How many items (subdomains) each rank owns: consecutive blocks, in rank order; then the first item of each, and the end.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shares(pub Vec<usize>);
+pub struct Shares(pub Vec<usize>, Vec<usize>);
 
 impl Shares {
+    /// Of so many items each.
+    pub fn new(counts: Vec<usize>) -> Self {
+        let mut begins = vec![0];
+        counts.iter().for_each(|count| begins.push(begins[begins.len() - 1] + count));
+        Self(counts, begins)
+    }
+
     /// First item of a rank.
     pub fn begin(&self, rank: usize) -> usize {
-        self.0[..rank].iter().sum()
+        self.1[rank]
     }
 
     /// Number of items of all ranks.
     pub fn total(&self) -> usize {
-        self.0.iter().sum()
+        self.1[self.0.len()]
     }
 
     /// The rank that owns an item.
+    ///
+    /// # Panics
+    /// If there is no such item.
     pub fn owner(&self, item: usize) -> usize {
-        let mut end = 0;
-        self.0
-            .iter()
-            .position(|&count| {
-                end += count;
-                item < end
-            })
-            .expect("item below the total")
+        assert!(item < self.total(), "item below the total");
+        self.1.partition_point(|&begin| begin <= item) - 1
     }
 
     /// Lengths of the ranks' blocks where every item takes `width` numbers.
@@ -124,6 +132,12 @@ pub fn from_root(comm: &dyn Comm, mine: Vec<u64>) -> Vec<u64> {
 /// Integers of all ranks in rank order; lengths may differ.
 pub fn all_gather_u64(comm: &dyn Comm, mine: &[u64]) -> Vec<u64> {
     comm.all_to_all(vec![mine.to_vec(); comm.size()]).concat()
+}
+
+/// Sums of counts over all ranks.
+pub fn sums<const N: usize>(comm: &dyn Comm, mine: [u64; N]) -> [u64; N] {
+    let all = all_gather_u64(comm, &mine);
+    std::array::from_fn(|k| all.iter().skip(k).step_by(N).sum())
 }
 
 /// Texts of all ranks in rank order.

@@ -173,7 +173,7 @@ mod tests {
                     assert_eq!(*pair, [from as u64, comm.rank() as u64]);
                 }
                 assert_eq!(all_gather_text(comm, &format!("r{}", comm.rank())).len(), size);
-                ordered_sum(comm, &Shares(vec![1; size]), &[rank, 1.0], 2)
+                ordered_sum(comm, &Shares::new(vec![1; size]), &[rank, 1.0], 2)
             });
             let total = (size * (size - 1) / 2) as f64;
             assert!(results.iter().all(|r| *r == [total, size as f64]));

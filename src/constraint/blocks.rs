@@ -3,13 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::Kind;
-use super::components::Components;
 use super::contact::Side;
+use super::links::{Linked, components};
 use super::prescribed::Prescribed;
 use super::ties::Ties;
 use super::{Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, gluing};
-use crate::comm::{Comm, all_gather_u64};
-use crate::contact::ContactPair;
+use crate::contact::known::Pairs;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
 /// Nodes tied together by contact and short edges, and the contact pairs among them.
@@ -19,25 +18,22 @@ struct Cluster {
 }
 
 impl Constraints {
-    /// All rows that touch this rank's subdomains. `pairs` are the contact pairs of the whole scene, `stiffness` that of all
-    /// subdomains (Young's modulus). Supports agree (see [`dirichlet::check`]). Of parallel contact conditions that gives the
-    /// row which is the tightest at the time `at`. Collective.
+    /// All rows that touch this rank's subdomains. Supports agree (see [`dirichlet::check`]). Of parallel contact conditions that
+    /// gives the row which is the tightest at the time `at`.
     pub fn new(
-        comm: &dyn Comm,
         decomposition: &Decomposition,
         supports: &[Support],
-        pairs: &[ContactPair],
-        stiffness: &[f64],
+        pairs: &Pairs,
+        linked: Linked,
         at: &Prescribed,
     ) -> Self {
-        let largest = stiffness.iter().copied().fold(0.0, f64::max);
-        let ties = Ties::new(comm, decomposition);
-        let (cluster_of, clusters) = clusters(pairs, &ties);
-        let clustered = gather_nodes(comm, decomposition, &cluster_of);
+        let Linked { nodes: tied, ties, stiffness } = linked;
+        let clusters = clusters(pairs, &ties);
+        let young = |subdomain: u32| stiffness.of(subdomain);
         let own: HashMap<u64, &InterfaceNode> = decomposition.interface.iter().map(|n| (n.node, n)).collect();
-        let node = |number: u64| clustered.get(&number).or_else(|| own.get(&number).copied());
-
-        let keys: BTreeSet<u64> = own.keys().map(|number| cluster_of.get(number).copied().unwrap_or(*number)).collect();
+        let node = |number: u64| tied.get(&number).or_else(|| own.get(&number).copied());
+        let alone = own.keys().filter(|number| !tied.contains_key(number));
+        let keys: BTreeSet<u64> = clusters.keys().chain(alone).copied().collect();
         let nodes = |key: u64| -> Vec<&InterfaceNode> {
             clusters
                 .get(&key)
@@ -51,8 +47,8 @@ impl Constraints {
             slot_subdomain: Vec::new(),
             entries: vec![Vec::new(); decomposition.subdomains.len()],
             copies: local_copies(decomposition),
-            has_inequalities: !pairs.is_empty(),
-            uneven: stiffness.iter().any(|young| young * JUMP <= largest),
+            has_inequalities: pairs.total() > 0,
+            uneven: stiffness.least * JUMP <= stiffness.largest,
             ties,
             idle: Vec::new(),
         };
@@ -61,7 +57,7 @@ impl Constraints {
             let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
             for interface in nodes(key) {
                 let fixed = dirichlet::fixed(interface, supports);
-                rows.extend(gluing::rows(interface, &decomposition.clusters, stiffness));
+                rows.extend(gluing::rows(interface, &decomposition.clusters, young));
                 rows.extend(dirichlet::rows(interface, &fixed));
                 sides.insert(interface.node, (interface, fixed));
             }
@@ -74,7 +70,7 @@ impl Constraints {
                 }
             }
             rows.extend(contacts.into_values().flatten());
-            rows.iter_mut().for_each(|row| row.weigh(stiffness, largest));
+            rows.iter_mut().for_each(|row| row.weigh(young, stiffness.largest));
             result.push_block(rows, subdomains, decomposition);
         }
         result
@@ -119,46 +115,18 @@ impl Constraints {
     }
 }
 
-/// Nodes that a pair ties together.
-fn nodes_of(pair: &ContactPair) -> impl Iterator<Item = u64> {
-    contact::nodes(pair).map(|(node, _)| node)
-}
-
-/// Copies and surfaces of all nodes of clusters, on every rank.
-fn gather_nodes(
-    comm: &dyn Comm,
-    decomposition: &Decomposition,
-    cluster_of: &HashMap<u64, u64>,
-) -> BTreeMap<u64, InterfaceNode> {
-    let mut mine = Vec::new();
-    for node in decomposition.interface.iter().filter(|n| cluster_of.contains_key(&n.node)) {
-        // The rank of the lowest copy sends the node.
-        if decomposition.own_index(node.copies[0]).is_some() {
-            node.pack(&mut mine);
-        }
-    }
-    InterfaceNode::unpack(&all_gather_u64(comm, &mine)).into_iter().map(|node| (node.node, node)).collect()
-}
-
-/// Connected components of the nodes under the contact pairs and the ties, named by their lowest node.
-fn clusters(pairs: &[ContactPair], ties: &Ties) -> (HashMap<u64, u64>, BTreeMap<u64, Cluster>) {
-    let mut components = Components::default();
-    for pair in pairs {
-        nodes_of(pair).for_each(|node| components.join(pair.slave, node));
-    }
-    for nodes in ties.nodes() {
-        nodes.iter().for_each(|&node| components.join(nodes[0], node));
-    }
-    let mut names = HashMap::new();
+/// The conditions of each connected component of nodes, and its nodes, by its lowest node.
+fn clusters(pairs: &Pairs, ties: &Ties) -> BTreeMap<u64, Cluster> {
+    let mut of_node = HashMap::new();
     let mut clusters: BTreeMap<u64, Cluster> = BTreeMap::new();
-    for (name, nodes) in components.members() {
-        names.extend(nodes.iter().map(|&node| (node, name)));
+    for (name, nodes) in components(pairs, ties) {
+        of_node.extend(nodes.iter().map(|&node| (node, name)));
         clusters.insert(name, Cluster { nodes, pairs: Vec::new() });
     }
-    for (number, pair) in pairs.iter().enumerate() {
-        clusters.get_mut(&names[&pair.slave]).expect("every name has its cluster").pairs.push(number);
+    for (number, pair) in pairs.iter() {
+        clusters.get_mut(&of_node[&pair.slave]).expect("every name has its cluster").pairs.push(number);
     }
-    (names, clusters)
+    clusters
 }
 
 /// Keys of blocks with the subdomains of their nodes, in the order of these: what counts for one subdomain is in one place, and

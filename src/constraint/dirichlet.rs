@@ -1,9 +1,8 @@
 //! Support rows: the mean over a node's copies has a prescribed value.
 
-use std::collections::HashMap;
-
 use super::prescribed::Prescribed;
 use super::{ConstraintError, Kind, Row, Support, Term};
+use crate::comm::meeting::look_up;
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::InterfaceNode;
 
@@ -12,18 +11,24 @@ pub(super) fn fixed(node: &InterfaceNode, supports: &[Support]) -> [Option<usize
     [0, 1, 2].map(|axis| at(node, supports, axis).next())
 }
 
-/// Which components supports fix at some nodes of named surfaces. The nodes are ascending, may be repeated, and are the same
-/// on every rank. Collective.
+/// Which components supports fix at some nodes of named surfaces, whoever has them. Collective.
 pub fn fixed_at(comm: &dyn Comm, interface: &[InterfaceNode], supports: &[Support], nodes: &[u64]) -> Vec<[bool; 3]> {
-    let mut mine = Vec::new();
-    for node in interface.iter().filter(|node| nodes.binary_search(&node.node).is_ok()) {
-        let fixed = fixed(node, supports).map(|support| u64::from(support.is_some()));
-        mine.extend([node.node, fixed[0], fixed[1], fixed[2]]);
-    }
-    let all = all_gather_u64(comm, &mine);
-    let reports = all.as_chunks::<4>().0.iter().map(|&[node, x, y, z]| (node, [x, y, z].map(|fixed| fixed == 1)));
-    let found: HashMap<u64, [bool; 3]> = reports.collect();
-    nodes.iter().map(|node| found.get(node).copied().unwrap_or_default()).collect()
+    let bits = |node: &InterfaceNode| {
+        fixed(node, supports).iter().rev().fold(0, |bits, support| 2 * bits + u64::from(support.is_some()))
+    };
+    let known = interface.iter().map(|node| ([node.node], bits(node))).filter(|(_, bits)| *bits != 0);
+    let found = look_up(comm, known.map(|(node, bits)| (node, vec![bits])), nodes.iter().map(|&node| [node]));
+    let of = |node: &u64| found.get(&[*node]).map_or([false; 3], |bits| [0, 1, 2].map(|axis| bits[0] >> axis & 1 == 1));
+    nodes.iter().map(of).collect()
+}
+
+/// Which components supports fix at some own nodes of named surfaces.
+pub fn fixed_here(interface: &[InterfaceNode], supports: &[Support], nodes: &[u64]) -> Vec<[bool; 3]> {
+    let of = |node: &u64| {
+        let at = interface.binary_search_by_key(node, |known| known.node);
+        at.map_or([false; 3], |at| fixed(&interface[at], supports).map(|support| support.is_some()))
+    };
+    nodes.iter().map(of).collect()
 }
 
 /// The supports that fix a component at a node.

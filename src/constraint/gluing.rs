@@ -7,10 +7,10 @@
 use super::{Kind, Row, Term};
 use crate::decomposition::{Clusters, InterfaceNode};
 
-/// The `3 (m - 1)` gluing rows of a node with `m` copies, given the stiffness of all subdomains.
-pub(super) fn rows(node: &InterfaceNode, clusters: &Clusters, stiffness: &[f64]) -> Vec<Row> {
+/// The `3 (m - 1)` gluing rows of a node with `m` copies, given the stiffness of subdomains.
+pub(super) fn rows(node: &InterfaceNode, clusters: &Clusters, stiffness: impl Fn(u32) -> f64) -> Vec<Row> {
     let mut copies = node.copies.clone();
-    copies.sort_by(|&a, &b| stiffness[b as usize].total_cmp(&stiffness[a as usize]));
+    copies.sort_by(|&a, &b| stiffness(b).total_cmp(&stiffness(a)));
     for level in 1..=clusters.levels() {
         let of = |copy: &u32| clusters.group(level, *copy as usize);
         let stiffest: Vec<usize> = copies.iter().map(of).collect();
@@ -57,7 +57,7 @@ mod tests {
         let [single, clusters, nested] =
             [&[][..], &[vec![3, 4, 2]], &[vec![3, 4, 2], vec![2, 1]]].map(|sizes| Clusters::new(9, sizes));
         for (clusters, leaving) in [(single, 15), (clusters, 6), (nested, 3)] {
-            let rows = rows(&node, &clusters, &[1.0, 4.0, 1.0, 1.0, 1.0, 2.0, 8.0, 1.0, 1.0]);
+            let rows = rows(&node, &clusters, |s| [1.0, 4.0, 1.0, 1.0, 1.0, 2.0, 8.0, 1.0, 1.0][s as usize]);
             assert_eq!(rows.len(), 15);
             for (i, a) in rows.iter().enumerate() {
                 assert!(a.terms.iter().map(|t| t.value).sum::<f64>().abs() < 1e-15);

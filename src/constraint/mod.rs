@@ -20,6 +20,7 @@ pub mod contact;
 pub mod dirichlet;
 pub mod gluing;
 pub mod law;
+pub mod links;
 pub mod prescribed;
 pub mod ties;
 
@@ -44,7 +45,7 @@ pub enum Kind {
     },
     /// Two surfaces do not penetrate.
     Contact {
-        /// Index of the contact pair.
+        /// Number of the contact pair among those of the scene.
         pair: usize,
     },
 }
@@ -112,9 +113,9 @@ const SOFTEST: f64 = 1e-9;
 
 impl Row {
     /// Gives a unit vector its length: the root of the stiffness it works against over the largest stiffness, rounded to a
-    /// power of two and at least the root of [`SOFTEST`]. Given are the stiffness of all subdomains and the largest of them.
-    fn weigh(&mut self, stiffness: &[f64], largest: f64) {
-        let flexibility: f64 = self.terms.iter().map(|t| t.value * t.value / stiffness[t.subdomain as usize]).sum();
+    /// power of two and at least the root of [`SOFTEST`]. Given are the stiffness of subdomains and the largest of all.
+    fn weigh(&mut self, stiffness: impl Fn(u32) -> f64, largest: f64) {
+        let flexibility: f64 = self.terms.iter().map(|t| t.value * t.value / stiffness(t.subdomain)).sum();
         let relative = (1.0 / (flexibility * largest)).max(SOFTEST);
         if relative * JUMP <= 1.0 {
             self.length = (0.5 * relative.log2()).round().exp2();

@@ -4,6 +4,8 @@
 //! is left of the gap `g` where supports move nodes of the condition, `scale (g - sum of weight d)`. Both are as long as the
 //! row (see [`Row::length`]). A gluing row's is zero.
 
+use std::collections::HashMap;
+
 use super::{Constraints, Fixed, Kind, Row};
 
 /// What supports and contacts prescribe at one time.
@@ -11,15 +13,15 @@ use super::{Constraints, Fixed, Kind, Row};
 pub struct Prescribed {
     /// Displacement of each support (length).
     pub displacements: Vec<[f64; 3]>,
-    /// Gap of each contact pair along its normal (length); the motion of an obstacle is part of it.
-    pub gaps: Vec<f64>,
+    /// Gap of each contact pair that is known here, by its number, along its normal (length); the motion of an obstacle is part of it.
+    pub gaps: HashMap<usize, f64>,
 }
 
 impl Prescribed {
     /// What is left of a pair's gap where supports fix components of its condition (length).
     pub(super) fn distance(&self, pair: usize, fixed: &[Fixed]) -> f64 {
         let left = |left: f64, h: &Fixed| left - h.weight * self.displacements[h.support][h.axis];
-        fixed.iter().fold(self.gaps[pair], left)
+        fixed.iter().fold(self.gaps[&pair], left)
     }
 }
 

@@ -1,3 +1,5 @@
+use std::collections::HashMap;
+
 use faer::Mat;
 
 use super::prescribed::Prescribed;
@@ -149,7 +151,7 @@ fn supports_in_conflict_are_refused_on_every_rank_with_one_message() {
             supports.push(Support { name, displacement: [0.0, 0.1, 0.5], ..twin.clone() });
             let interface = &setup.discrete.decomposition.interface;
             let displacements = supports.iter().map(|support| support.displacement).collect();
-            let at = Prescribed { displacements, gaps: Vec::new() };
+            let at = Prescribed { displacements, gaps: HashMap::new() };
             dirichlet::check(setup.comm, interface, &supports, &at).err()
         });
         let expected = ConstraintError::Conflict {
@@ -169,7 +171,7 @@ fn a_pair_fixed_on_both_sides_along_the_normal_has_no_row() {
     for ranks in RANKS {
         on_ranks(&flush, ranks, |setup| {
             let contact = crate::sizing::sizes(&setup.discrete, setup.comm).contact_rows;
-            assert_eq!((setup.discrete.contacts.pairs.len(), contact), (15, 12));
+            assert_eq!((setup.discrete.contacts.pairs.total(), contact), (15, 12));
         });
     }
     on_ranks(&flush, 1, |setup| assert_eq!(setup.discrete.constraints.idle.len(), 3));
@@ -194,7 +196,7 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
     let pair = pair(&[(7, 1.0), (6, 0.5)], &[(8, 0.75), (9, 0.75)]);
     let nodes = [node(6, &[3]), node(7, &[0, 3]), node(8, &[1, 2, 4]), node(9, &[2])];
     let (held, free) = ([Some(0), None, None], [None; 3]);
-    let at = Prescribed { displacements: vec![[0.25, 0.0, 0.0]], gaps: vec![0.0, 0.0, 0.0, 0.5] };
+    let at = Prescribed { displacements: vec![[0.25, 0.0, 0.0]], gaps: HashMap::from([(3, 0.5)]) };
     let side = |number: u64, fixed: [Option<usize>; 3]| (&nodes[number as usize - 6], fixed);
     let row = contact::row(3, &pair, |n| side(n, if n % 2 == 1 { held } else { free })).expect("much is free");
     let square: f64 = row.terms.iter().map(|t| t.value * t.value).sum();
@@ -222,7 +224,7 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
 fn of_contacts_in_one_direction_the_tightest_counts() {
     let slave = node(7, &[0, 3]);
     const GAPS: [f64; 5] = [0.5, -0.5, 0.2, 0.3, 0.1];
-    let at = |gaps: [f64; 5]| Prescribed { displacements: Vec::new(), gaps: gaps.to_vec() };
+    let at = |gaps: [f64; 5]| Prescribed { displacements: Vec::new(), gaps: gaps.into_iter().enumerate().collect() };
     let row = |number: usize, normal: [f64; 3]| {
         let pair = ContactPair { normal, ..pair(&[(7, 1.0)], &[]) };
         contact::row(number, &pair, |_| (&slave, [None; 3])).expect("it is free")

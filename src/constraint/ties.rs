@@ -4,10 +4,10 @@
 //! so the diagonal of the stiffness at one node is far larger than its resistance. The scaling of the preconditioner
 //! therefore treats such nodes as a group, and their rows are in one block.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::components::Components;
-use crate::comm::{Comm, all_gather_u64};
+use crate::comm::{Comm, maximum};
 use crate::decomposition::{Decomposition, Subdomain};
 use crate::mesh::Elements;
 
@@ -26,18 +26,21 @@ pub struct Group {
     pub on_interface: Vec<u32>,
 }
 
-/// The groups that have nodes on the interface.
+/// The groups that have nodes on the interface: those that have a node in a block of this rank.
 pub struct Ties {
     /// Groups of each own subdomain.
     own: Vec<Vec<Group>>,
-    /// Nodes on the interface of each group of all subdomains, and which subdomain it is.
-    all: Vec<(u32, Vec<u64>)>,
-    /// Where a copy of a node is: the number of its group, and its place among those on the interface.
+    /// Nodes on the interface of each group that is known here, by its subdomain and its number there.
+    known: BTreeMap<(u32, u32), Vec<u64>>,
+    /// Where a copy of a node is: the number of its group among those known here, in their order, and its place among those on the
+    /// interface.
     place: HashMap<(u32, u64), (u32, u32)>,
+    /// Most nodes on the interface that a group has, on any rank.
+    widest: usize,
 }
 
 impl Ties {
-    /// Of all subdomains. Collective.
+    /// Those of the subdomains that have copies of own nodes. Collective.
     pub fn new(comm: &dyn Comm, decomposition: &Decomposition) -> Self {
         let on_interface = |node| decomposition.interface.binary_search_by_key(&node, |n| n.node).is_ok();
         let of_subdomain = |subdomain: &Subdomain| {
@@ -49,23 +52,52 @@ impl Ties {
             groups.filter(|group| !group.on_interface.is_empty()).collect()
         };
         let own: Vec<Vec<Group>> = decomposition.subdomains.iter().map(of_subdomain).collect();
-        let mut mine = Vec::new();
+        let mut known = BTreeMap::new();
         for (subdomain, groups) in decomposition.subdomains.iter().zip(&own) {
-            for group in groups {
-                mine.extend([subdomain.id as u64, group.on_interface.len() as u64]);
-                mine.extend(group.on_interface.iter().map(|&k| subdomain.nodes[group.nodes[k as usize] as usize]));
+            for (number, group) in (0..).zip(groups) {
+                let node = |&k: &u32| subdomain.nodes[group.nodes[k as usize] as usize];
+                known.insert((subdomain.id as u32, number), group.on_interface.iter().map(node).collect::<Vec<u64>>());
             }
         }
-        let mut numbers = all_gather_u64(comm, &mine).into_iter();
-        let mut all = Vec::new();
-        while let (Some(subdomain), Some(count)) = (numbers.next(), numbers.next()) {
-            all.push((subdomain as u32, numbers.by_ref().take(count as usize).collect::<Vec<u64>>()));
+        let widest = known.values().map(Vec::len).max().unwrap_or(0);
+        let widest = maximum(comm, &[widest as f64])[0] as usize;
+        let mut outgoing = vec![Vec::new(); comm.size()];
+        for (group, nodes) in &known {
+            let copies = nodes.iter().flat_map(|node| {
+                let at = decomposition.interface.binary_search_by_key(node, |n| n.node).expect("it is there");
+                &decomposition.interface[at].copies
+            });
+            let ranks: BTreeSet<usize> = copies.map(|&copy| decomposition.owner(copy)).collect();
+            ranks.into_iter().for_each(|rank| pack(*group, nodes, &mut outgoing[rank]));
         }
-        let mut place = HashMap::new();
-        for (number, (subdomain, nodes)) in (0..).zip(&all) {
-            (0..).zip(nodes).for_each(|(k, &node)| assert!(place.insert((*subdomain, node), (number, k)).is_none()));
+        let mut ties = Self { own, known, place: HashMap::new(), widest };
+        ties.unpack(comm.all_to_all(outgoing));
+        ties
+    }
+
+    /// Groups of own subdomains that have a node for which this holds, as numbers, for sending.
+    pub fn pack(&self, first: u32, has: impl Fn(u64) -> bool, message: &mut Vec<u64>) {
+        let last = first + self.own.len() as u32;
+        let own = self.known.range((first, 0)..(last, 0)).filter(|(_, nodes)| nodes.iter().any(|&node| has(node)));
+        own.for_each(|(group, nodes)| pack(*group, nodes, message));
+    }
+
+    /// Adds groups that ranks have packed one behind the other.
+    pub fn unpack(&mut self, messages: Vec<Vec<u64>>) {
+        for message in messages {
+            let mut rest = &message[..];
+            while let [group, count, behind @ ..] = rest {
+                let (nodes, behind) = behind.split_at(*count as usize);
+                self.known.insert(((*group >> 32) as u32, *group as u32), nodes.to_vec());
+                rest = behind;
+            }
         }
-        Self { own, all, place }
+        self.place.clear();
+        for (number, ((subdomain, _), nodes)) in (0..).zip(&self.known) {
+            for (k, &node) in (0..).zip(nodes) {
+                assert!(self.place.insert((*subdomain, node), (number, k)).is_none(), "groups have no node in common");
+            }
+        }
     }
 
     /// Groups of an own subdomain.
@@ -73,20 +105,25 @@ impl Ties {
         &self.own[own]
     }
 
-    /// Nodes on the interface of each group.
+    /// Nodes on the interface of each group that is known here.
     pub fn nodes(&self) -> impl Iterator<Item = &[u64]> {
-        self.all.iter().map(|(_, nodes)| nodes.as_slice())
+        self.known.values().map(Vec::as_slice)
     }
 
     /// Most nodes on the interface that a group has, on any rank; 0 if there are no groups.
     pub fn widest(&self) -> usize {
-        self.nodes().map(<[u64]>::len).max().unwrap_or(0)
+        self.widest
     }
 
     /// The number of the group of a copy of a node, and its place among those on the interface.
     pub fn place(&self, subdomain: u32, node: u64) -> Option<(u32, u32)> {
         self.place.get(&(subdomain, node)).copied()
     }
+}
+
+fn pack((subdomain, number): (u32, u32), nodes: &[u64], message: &mut Vec<u64>) {
+    message.extend([u64::from(subdomain) << 32 | u64::from(number), nodes.len() as u64]);
+    message.extend(nodes);
 }
 
 /// Groups of nodes, ascending, of elements on nodes at these points.
@@ -147,10 +184,10 @@ mod tests {
     }
 
     #[test]
-    fn all_ranks_know_all_groups_on_the_interface() {
+    fn ranks_know_the_groups_of_the_subdomains_that_share_their_nodes() {
         let flat = ["body.upper.brick.size.2=0.2"];
         for scene in [two_bricks(&flat), two_bricks(&["decomposition.subdomains=7", flat[0]])] {
-            let mut known = Vec::new();
+            let mut groups = Vec::new();
             for ranks in RANKS {
                 let found = on_ranks(&scene, ranks, |setup| {
                     let ties = Ties::new(setup.comm, &setup.discrete.decomposition);
@@ -167,14 +204,20 @@ mod tests {
                             own += 1;
                         }
                     }
-                    (own, ties.nodes().map(<[u64]>::to_vec).collect::<Vec<_>>())
+                    let interface = setup.discrete.decomposition.interface.iter().map(|node| node.node).collect();
+                    (own, ties.known, interface)
                 });
-                let all = &found[0].1;
-                assert!(!all.is_empty() && found.iter().all(|(_, other)| other == all));
-                assert_eq!(found.iter().map(|(own, _)| own).sum::<usize>(), all.len());
-                known.push(all.clone());
+                let all: BTreeMap<(u32, u32), Vec<u64>> =
+                    found.iter().flat_map(|(_, known, _)| known.clone()).collect();
+                assert!(!all.is_empty());
+                assert_eq!(found.iter().map(|(own, ..)| own).sum::<usize>(), all.len());
+                for (_, known, interface) in &found {
+                    let touches = |nodes: &Vec<u64>| nodes.iter().any(|node| BTreeSet::contains(interface, node));
+                    assert!(known.keys().eq(all.iter().filter(|(_, nodes)| touches(nodes)).map(|(group, _)| group)));
+                }
+                groups.push(all);
             }
-            assert!(known.iter().all(|all| *all == known[0]), "whatever the ranks");
+            assert!(groups.iter().all(|all| *all == groups[0]), "whatever the ranks");
         }
     }
 }

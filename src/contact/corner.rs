@@ -9,33 +9,55 @@ use std::collections::BTreeMap;
 
 use super::surface::unit;
 use super::{ContactError, ContactPair};
+use crate::comm::Comm;
 use crate::vector::{difference, dot, length};
 
 /// Distance of a unit vector to the others or to their span from which a direction counts as independent.
 const INDEPENDENT: f64 = 1e-6;
 
-/// Refuses directions that are too many for a node. `held` tells which components of some nodes supports fix; it is asked
-/// at most once, with the same nodes on every rank.
+/// Refuses directions that are too many for a node. Each rank has all conditions of some slave nodes, no two of them of the same
+/// one; `held` tells which components of these supports fix. Collective.
 ///
 /// # Errors
 /// With the contacts that meet at the first such node.
-pub fn check(
+pub fn check<'a>(
+    comm: &dyn Comm,
     names: &[String],
-    pairs: &[ContactPair],
-    held: impl FnOnce(&[u64]) -> Vec<[bool; 3]>,
+    pairs: impl IntoIterator<Item = &'a ContactPair>,
+    held: impl Fn(&[u64]) -> Vec<[bool; 3]>,
 ) -> Result<(), ContactError> {
-    // By what they meet: nothing but themselves, or one node.
-    let mut stopped: BTreeMap<(u64, Option<u64>), Vec<&ContactPair>> = BTreeMap::new();
-    for pair in pairs.iter().filter(|pair| pair.masters.len() <= 1) {
+    let crowded = crowded(pairs, held);
+    let mut mine = vec![crowded.len() as u64];
+    if let Some(((slave, master), contacts)) = crowded.first() {
+        // What meets no node comes before what meets one.
+        mine.extend([*slave, u64::from(master.is_some()), master.unwrap_or_default()]);
+        mine.extend(contacts.iter().map(|&contact| contact as u64));
+    }
+    let all = comm.all_to_all(vec![mine; comm.size()]);
+    let nodes = all.iter().map(|of_rank| of_rank[0] as usize).sum();
+    let Some(first) = all.iter().filter(|of_rank| of_rank[0] > 0).min_by_key(|of_rank| &of_rank[1..]) else {
+        return Ok(());
+    };
+    let contacts: Vec<&str> = first[4..].iter().map(|&contact| &names[contact as usize][..]).collect();
+    Err(ContactError::Crowded { names: contacts.join(", "), nodes })
+}
+
+/// What a condition stops: a slave node against nothing but the other side itself, or against one node of it.
+type Stopped = (u64, Option<u64>);
+
+/// What is stopped in too many directions, ascending, and by which contacts.
+fn crowded<'a>(
+    pairs: impl IntoIterator<Item = &'a ContactPair>,
+    held: impl Fn(&[u64]) -> Vec<[bool; 3]>,
+) -> Vec<(Stopped, Vec<usize>)> {
+    let mut stopped: BTreeMap<Stopped, Vec<&ContactPair>> = BTreeMap::new();
+    for pair in pairs.into_iter().filter(|pair| pair.masters.len() <= 1) {
         stopped.entry((pair.slave, pair.masters.first().map(|(node, _)| *node))).or_default().push(pair);
     }
     stopped.retain(|_, pairs| pairs.len() > 1);
     let nodes: Vec<u64> = stopped.keys().map(|(slave, _)| *slave).collect();
-    if nodes.is_empty() {
-        return Ok(());
-    }
     let mut crowded = Vec::new();
-    for (pairs, held) in stopped.values().zip(held(&nodes)) {
+    for ((key, pairs), held) in stopped.into_iter().zip(held(&nodes)) {
         let free = |pair: &ContactPair| unit(std::array::from_fn(|a| if held[a] { 0.0 } else { pair.normal[a] }));
         let mut directions: Vec<[f64; 3]> = Vec::new();
         for direction in pairs.iter().filter_map(|pair| free(pair)) {
@@ -44,13 +66,12 @@ pub fn check(
             }
         }
         if directions.len() > rank(&directions) {
-            crowded.push(pairs);
+            let mut contacts: Vec<usize> = pairs.iter().map(|pair| pair.contact).collect();
+            contacts.dedup();
+            crowded.push((key, contacts));
         }
     }
-    let Some(first) = crowded.first() else { return Ok(()) };
-    let mut contacts: Vec<&str> = first.iter().map(|pair| names[pair.contact].as_str()).collect();
-    contacts.dedup();
-    Err(ContactError::Crowded { names: contacts.join(", "), nodes: crowded.len() })
+    crowded
 }
 
 /// Directions that are independent of those before them.
@@ -72,6 +93,7 @@ fn rank(directions: &[[f64; 3]]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::comm::solo::Solo;
 
     fn checked(normals: &[[f64; 3]], held: [bool; 3]) -> Result<(), ContactError> {
         let alone = against(&[], normals, held);
@@ -93,7 +115,7 @@ mod tests {
             covered: true,
         };
         let pairs: Vec<ContactPair> = normals.iter().enumerate().map(pair).collect();
-        check(&names, &pairs, |nodes| vec![held; nodes.len()])
+        check(&Solo, &names, &pairs, |nodes| vec![held; nodes.len()])
     }
 
     #[test]

@@ -6,7 +6,8 @@
 
 use std::collections::HashSet;
 
-use super::surface::{FACING, GatheredSurface};
+use super::patch::Line;
+use super::surface::{FACING, GatheredSurface, Layer};
 use super::tree::BallTree;
 use super::{Conditions, ContactPair, MasterNode};
 use crate::mesh::surface;
@@ -15,20 +16,35 @@ use crate::vector::{difference, dot};
 /// How far, in edge lengths of the master surface, a master node may lie beside the slave node's normal.
 const TOLERANCE: f64 = 1e-6;
 
-/// Conditions of contact number `contact`. `None` if the surfaces do not match: if a node of one side has the other side
-/// opposite but none of its nodes, or if nodes match but triangles do not.
-pub fn pair(contact: usize, slave: &GatheredSurface, master: &GatheredSurface) -> Option<Conditions> {
-    let opposite = opposite_nodes(slave, master)?;
-    let back = opposite_nodes(master, slave)?;
-    if differ(slave, master, &opposite) || differ(master, slave, &back) {
-        return None;
-    }
+/// For each node of a surface the node of the other that is opposite, and its distance along the normal.
+pub type Facing = Vec<Option<(usize, f64)>>;
+
+/// The lines through the nodes of a surface that [`facing`] looks along, as far as all faces around them are here. `spacing` is
+/// that of the other surface.
+pub fn lines(surface: &GatheredSurface, spacing: f64) -> Vec<Line> {
+    let nodes = surface.points.iter().zip(surface.normals_and_areas()).enumerate();
+    let here = nodes.filter(|(node, _)| surface.layer(*node) != Layer::Rim);
+    here.map(|(_, (&point, (direction, _)))| Line { point, direction, distance: spacing }).collect()
+}
+
+/// What the nodes of one surface face on the other, of which all is here that is near [`lines`]; nothing where some faces around a
+/// node are missing. `None` if the surfaces do not match: if a node has the other side opposite but none of its nodes, or if nodes
+/// match but triangles do not.
+pub fn facing(one: &GatheredSurface, other: &GatheredSurface) -> Option<Facing> {
+    opposite_nodes(one, other).filter(|opposite| !differ(one, other, opposite))
+}
+
+/// Conditions of contact number `contact` on the nodes of own faces.
+pub fn conditions(contact: usize, slave: &GatheredSurface, master: &GatheredSurface, facing: Facing) -> Conditions {
     let normals: Vec<[f64; 3]> = slave.normals_and_areas().into_iter().map(|(normal, _)| normal).collect();
-    let areas = slave.covered_areas(&normals, |node| opposite[node].is_some());
+    let areas = slave.covered_areas(&normals, |node| facing[node].is_some());
     let mut found = Conditions::default();
-    for (k, (opposite, area)) in opposite.into_iter().zip(areas).enumerate() {
-        let Some((node, gap)) = opposite.filter(|_| area > 0.0) else { continue };
-        found.masters.push(MasterNode { node: master.nodes[node], pairs: vec![(found.pairs.len(), 1.0)] });
+    for (k, (opposite, area)) in facing.into_iter().zip(areas).enumerate() {
+        let Some((node, gap)) = opposite.filter(|_| area > 0.0 && slave.layer(k) == Layer::Own) else { continue };
+        if slave.tells(k) {
+            let (node, part, pairs) = (master.nodes[node], master.parts[node], vec![(found.pairs.len(), 1.0)]);
+            found.masters.push(MasterNode { contact, node, part, distance: gap, matches: true, pairs });
+        }
         found.pairs.push(ContactPair {
             contact,
             slave: slave.nodes[k],
@@ -41,7 +57,14 @@ pub fn pair(contact: usize, slave: &GatheredSurface, master: &GatheredSurface) -
             covered: true,
         });
     }
-    Some(found)
+    found
+}
+
+/// Conditions of surfaces that are here as a whole; `None` if they do not match.
+#[cfg(test)]
+pub fn pair(contact: usize, slave: &GatheredSurface, master: &GatheredSurface) -> Option<Conditions> {
+    facing(master, slave)?;
+    Some(conditions(contact, slave, master, facing(slave, master)?))
 }
 
 /// Whether one surface has a triangle whose corners have opposite nodes that are no triangle of the other.
@@ -59,16 +82,19 @@ fn differ(one: &GatheredSurface, other: &GatheredSurface, opposite: &[Option<(us
 }
 
 /// For each node of one surface the node of the other that is opposite, and its distance. `None` if only the surface is.
-fn opposite_nodes(one: &GatheredSurface, other: &GatheredSurface) -> Option<Vec<Option<(usize, f64)>>> {
+fn opposite_nodes(one: &GatheredSurface, other: &GatheredSurface) -> Option<Facing> {
     let spacing = other.spacing();
     let corners: Vec<_> = other.corners().collect();
     let tree = BallTree::new(&corners);
     let facing = |triangle: &usize, normal| {
         surface::normal(&corners[*triangle]).is_some_and(|other| dot(normal, other) < -FACING)
     };
-    let nodes = one.points.iter().zip(one.normals_and_areas());
+    let nodes = one.points.iter().zip(one.normals_and_areas()).enumerate();
     nodes
-        .map(|(&point, (normal, _))| {
+        .map(|(node, (&point, (normal, _)))| {
+            if one.layer(node) == Layer::Rim {
+                return Some(None);
+            }
             let mut triangles = tree.along(point, normal, spacing);
             triangles.retain(|triangle| facing(triangle, normal));
             match opposite(other, &triangles, point, normal, spacing) {
@@ -135,7 +161,15 @@ mod tests {
         let h = size / n as f64;
         let points = (0..(n + 1) * (n + 1)).map(|k| [(k % (n + 1)) as f64 * h, (k / (n + 1)) as f64 * h, z]).collect();
         let nodes: Vec<u64> = (0..((n + 1) * (n + 1)) as u64).map(|k| first + k).collect();
-        GatheredSurface { parts: vec![0; nodes.len()], nodes, points, triangles, share: 1.0, quadratic: Vec::new() }
+        GatheredSurface {
+            parts: vec![0; nodes.len()],
+            nodes,
+            points,
+            triangles,
+            share: 1.0,
+            quadratic: Vec::new(),
+            of: None,
+        }
     }
 
     #[test]

@@ -3,18 +3,22 @@
 //! Every condition is one on a slave node: against the master node opposite where meshes match ([`matching`]), against
 //! weighted means of master nodes where they do not ([`mortar`]), or against a rigid obstacle ([`rigid`]). On quadratic
 //! faces conditions of nodes are combined ([`quadratic`]). [`pairing`] finds out which, and which surface is the slave.
-//! Surfaces are two-dimensional, so every rank sees both sides of each contact whole, for the time of the pairing only; what
-//! is kept of it are the pairs.
+//!
+//! No rank sees a surface whole. A rank has its own faces with two layers around them, and asks for the faces of the other side
+//! that are along the normals of these ([`patch`]). What it makes of them has the bits that the whole surfaces would give.
+//! [`known`] numbers the conditions and brings them to the ranks that have copies of their nodes.
 
 pub mod areas;
 pub mod clip;
 pub mod corner;
 pub mod dual;
 pub mod edge;
+pub mod known;
 pub mod matching;
 pub mod mortar;
 pub mod opposite;
 pub mod pairing;
+pub mod patch;
 pub mod quadratic;
 pub mod rigid;
 pub mod sagitta;
@@ -58,23 +62,42 @@ impl ContactPair {
     }
 }
 
+/// Where a contact condition is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Site {
+    /// Place of the slave node.
+    pub place: [f64; 3],
+    /// Longest edge of the facets around it.
+    pub facet: f64,
+}
+
 /// A node of the master surface that has slave nodes opposite: what the pressure is there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MasterNode {
+    /// Index of the contact in the scene.
+    pub contact: usize,
     /// Global node.
     pub node: u64,
+    /// Number of the smooth part of the surface around it.
+    pub part: u32,
+    /// Distance of the slave surface (length).
+    pub distance: f64,
+    /// Whether it is opposite the slave node of one condition, as meshes match.
+    pub matches: bool,
     /// Indices of conditions with weights, which add up to one: its pressure is the mean of theirs.
     pub pairs: Vec<(usize, f64)>,
 }
 
-/// The conditions of one contact.
+/// The conditions of one contact on the nodes of a rank's own faces.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conditions {
-    /// Ascending by slave node and part.
+    /// Ascending by slave node and part. Ranks that share a node have its conditions all.
     pub pairs: Vec<ContactPair>,
-    /// Nodes of the master surface within the slave's reach, by the indices of these pairs.
+    /// Nodes of the master surface within reach of the rank's own faces, by the indices of these pairs.
     pub masters: Vec<MasterNode>,
-    /// Slave nodes that carry no condition because supports hold them.
+    /// Conditions of all ranks.
+    pub count: usize,
+    /// Slave nodes of all ranks that carry no condition because supports hold them.
     pub held: usize,
 }
 

@@ -23,8 +23,9 @@
 use std::collections::BTreeMap;
 
 use super::dual::{self, DualFunctions};
-use super::opposite::{Face, INSIDE, IntegrationPoint, Opposite, Seen, faces, functions};
-use super::surface::GatheredSurface;
+use super::opposite::{Face, INSIDE, IntegrationPoint, Opposite, Seen, faces, functions, line};
+use super::patch::Line;
+use super::surface::{GatheredSurface, Layer};
 use super::{Conditions, ContactError, ContactPair, MasterNode, edge};
 use crate::mesh::surface;
 use crate::vector::{difference, dot};
@@ -44,6 +45,8 @@ const AT_THE_EDGE: f64 = 1.0 - 1e-3;
 struct Part<'a> {
     /// Its nodes, corners first.
     face: &'a [usize],
+    /// Whether it is an own one.
+    own: bool,
     seen: Seen,
     /// Functions of the corners at the places of their multipliers; `None` where these are the corners.
     places: Option<[[f64; 3]; 3]>,
@@ -62,34 +65,31 @@ struct Sums {
     masters: BTreeMap<u64, f64>,
 }
 
-/// Conditions of contact number `contact`. `held` tells for each slave node the directions that supports fix.
-///
-/// # Errors
-/// If the surfaces do not face each other, or supports hold all slave nodes that do.
-pub fn pair(
+/// The lines through the triangles of a surface along which those of the other are looked for.
+pub fn lines(surface: &GatheredSurface) -> Vec<Line> {
+    surface.corners().filter_map(|corners| surface::normal(&corners).map(|normal| line(&corners, normal))).collect()
+}
+
+/// Conditions of contact number `contact` on the nodes of own faces, and whether surfaces face each other anywhere: of the master
+/// is here what is near [`lines`]. `held` tells for each slave node the directions that supports fix. The counts are this rank's.
+pub fn conditions(
     contact: usize,
-    name: &str,
     slave: &GatheredSurface,
     master: &GatheredSurface,
     held: &[[bool; 3]],
-) -> Result<Conditions, ContactError> {
+) -> (Conditions, bool) {
     let normals = slave.normals_and_areas();
     let parts = parts(slave, master, &normals);
-    if parts.is_empty() {
-        return Err(ContactError::Apart { name: name.to_owned() });
-    }
     let reach = reach(&parts, slave.nodes.len());
     let is_held = |node: usize| is_held(normals[node].0, held[node]);
     let active: Vec<bool> = (0..reach.len()).map(|node| reach[node] >= REACH && !is_held(node)).collect();
     let mut sums: BTreeMap<usize, Sums> = BTreeMap::new();
     parts.iter().for_each(|part| add(&mut sums, part, &active, master));
-    sums.retain(|&node, sums| sums.whole > COVERED * normals[node].1);
-    let held = (0..reach.len()).filter(|&node| reach[node] >= REACH && is_held(node)).count();
-    if sums.is_empty() {
-        let name = name.to_owned();
-        return Err(if held > 0 { ContactError::AllHeld { name } } else { ContactError::Apart { name } });
-    }
+    sums.retain(|&node, sums| slave.layer(node) == Layer::Own && sums.whole > COVERED * normals[node].1);
     let of_node: BTreeMap<usize, usize> = sums.keys().copied().zip(0..).collect();
+    let told = |node: &usize| slave.tells(*node);
+    let count = of_node.keys().copied().filter(told).count();
+    let held = (0..reach.len()).filter(told).filter(|&node| reach[node] >= REACH && is_held(node)).count();
     let condition = |(node, sums): (usize, Sums)| {
         let (normal, origin) = (normals[node].0, slave.points[node]);
         let along = |point: [f64; 3]| dot(normal, difference(point, origin));
@@ -108,11 +108,35 @@ pub fn pair(
             covered: reach[node] >= AT_THE_EDGE,
         }
     };
-    Ok(Conditions {
-        pairs: sums.into_iter().map(condition).collect(),
-        masters: master_nodes(&parts, master, &of_node),
-        held,
-    })
+    let masters = master_nodes(contact, &parts, master, &of_node);
+    let pairs = sums.into_iter().map(condition).collect();
+    (Conditions { pairs, masters, count, held }, !parts.is_empty())
+}
+
+/// What is wrong with the conditions of all ranks, if anything; `is_opposite` says whether surfaces face each other anywhere.
+///
+/// # Errors
+/// If the surfaces do not face each other, or supports hold all slave nodes that do.
+pub fn accept(name: &str, found: Conditions, is_opposite: bool) -> Result<Conditions, ContactError> {
+    let name = name.to_owned();
+    match found {
+        found if found.count > 0 => Ok(found),
+        found if is_opposite && found.held > 0 => Err(ContactError::AllHeld { name }),
+        _ => Err(ContactError::Apart { name }),
+    }
+}
+
+/// Conditions of surfaces that are here as a whole.
+#[cfg(test)]
+pub fn pair(
+    contact: usize,
+    name: &str,
+    slave: &GatheredSurface,
+    master: &GatheredSurface,
+    held: &[[bool; 3]],
+) -> Result<Conditions, ContactError> {
+    let (found, is_opposite) = conditions(contact, slave, master, held);
+    accept(name, found, is_opposite)
 }
 
 /// Weights of nodes, each once.
@@ -128,13 +152,14 @@ fn parts<'a>(slave: &'a GatheredSurface, master: &GatheredSurface, normals: &[([
     let corners: Vec<_> = slave.corners().collect();
     let part = |Face { nodes, triangles }: Face<'a>| {
         let mut seen = Seen::default();
+        let own = slave.owns(triangles.start);
         triangles.for_each(|k| opposite.add(slave, k, &corners[k], &mut seen));
         let ends = [0, 1, 2].map(|k| nodes[k]);
         let along = surface::normal(&ends.map(|node| slave.points[node])).filter(|_| !seen.points.is_empty())?;
         let area: f64 = seen.points.iter().map(|point| point.area).sum();
         let mean = |k: usize| seen.points.iter().map(|point| point.area * point.at[k]).sum::<f64>() / area;
         let places = edge::places(&seen.corners, [0, 1, 2].map(mean));
-        Some(Part { face: nodes, seen, places, cosines: ends.map(|node| dot(normals[node].0, along)) })
+        Some(Part { face: nodes, own, seen, places, cosines: ends.map(|node| dot(normals[node].0, along)) })
     };
     faces(slave).filter_map(part).collect()
 }
@@ -148,11 +173,16 @@ fn reach(parts: &[Part], nodes: usize) -> Vec<f64> {
     reach
 }
 
-/// What the pressure is at the master's nodes, on each smooth part around them, from the conditions on the slave's: where several
-/// faces are opposite, the nearest counts.
-fn master_nodes(parts: &[Part], master: &GatheredSurface, of_node: &BTreeMap<usize, usize>) -> Vec<MasterNode> {
+/// What the pressure is at the master's nodes, on each smooth part around them, from the conditions on own faces of the slave: where
+/// several faces are opposite, the nearest counts.
+fn master_nodes(
+    contact: usize,
+    parts: &[Part],
+    master: &GatheredSurface,
+    of_node: &BTreeMap<usize, usize>,
+) -> Vec<MasterNode> {
     let mut nearest: BTreeMap<usize, (f64, Vec<(usize, f64)>)> = BTreeMap::new();
-    for Part { face, seen, .. } in parts {
+    for Part { face, seen, .. } in parts.iter().filter(|part| part.own) {
         for &(node, distance, at) in &seen.masters {
             let weights = (0..3).filter_map(|k| Some((*of_node.get(&face[k])?, at[k].max(0.0))));
             let weights: Vec<_> = weights.filter(|(_, weight)| *weight > INSIDE).collect();
@@ -162,7 +192,15 @@ fn master_nodes(parts: &[Part], master: &GatheredSurface, of_node: &BTreeMap<usi
             }
         }
     }
-    nearest.into_iter().map(|(node, (_, pairs))| MasterNode { node: master.nodes[node], pairs }).collect()
+    let of = |(slot, (distance, pairs)): (usize, (f64, Vec<(usize, f64)>))| MasterNode {
+        contact,
+        node: master.nodes[slot],
+        part: master.parts[slot],
+        distance,
+        matches: false,
+        pairs,
+    };
+    nearest.into_iter().map(of).collect()
 }
 
 /// Whether supports fix all of a direction, but for round-off.

@@ -5,6 +5,7 @@
 //! quadratic. Pieces that look away from the slave, or overlap so deep that they are the far side of a body, are not opposite.
 
 use super::clip::{Point, barycentric, intersection, turn};
+use super::patch::Line;
 use super::surface::{FACING, GatheredSurface};
 use super::tree::BallTree;
 use crate::mesh::surface;
@@ -126,9 +127,7 @@ impl<'a> Opposite<'a> {
         let plane = Plane::new(slave, normal);
         let flat = slave.map(|corner| plane.project(corner));
         let whole = turn(flat[0], flat[1], flat[2]);
-        let middle = std::array::from_fn(|a| slave.iter().map(|corner| corner[a]).sum::<f64>() / 3.0);
-        let arms = slave.map(|corner| difference(corner, middle));
-        let reach = arms.iter().map(|arm| dot(*arm, *arm)).fold(0.0, f64::max).sqrt();
+        let Line { point: middle, distance: reach, .. } = line(slave, normal);
         for index in self.tree.along(middle, normal, reach) {
             if !self.normals[index].is_some_and(|other| dot(normal, other) < -FACING) {
                 continue;
@@ -166,6 +165,14 @@ impl<'a> Opposite<'a> {
             }
         }
     }
+}
+
+/// The line through the middle of a triangle along its normal, and how far from it corners are.
+pub(super) fn line(triangle: &[[f64; 3]; 3], normal: [f64; 3]) -> Line {
+    let middle = std::array::from_fn(|a| triangle.iter().map(|corner| corner[a]).sum::<f64>() / 3.0);
+    let arms = triangle.map(|corner| difference(corner, middle));
+    let reach = arms.iter().map(|arm| dot(*arm, *arm)).fold(0.0, f64::max).sqrt();
+    Line { point: middle, direction: normal, distance: reach }
 }
 
 /// A plane through a triangle, with coordinates in it.

@@ -4,8 +4,9 @@
 //! If that does not decide, it is the finer one, on which more conditions fit: the coarser one would let the finer one's nodes
 //! enter between its own. If that does not decide either, it is the one named first.
 
-use super::surface::GatheredSurface;
+use super::patch::Patch;
 use super::{Conditions, ContactError, ContactPair, matching, mortar, quadratic};
+use crate::comm::{Comm, sums};
 
 /// What the conditions on the slave nodes are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,25 +25,56 @@ pub type HeldNodes<'a> = &'a dyn Fn(&[u64]) -> Vec<[bool; 3]>;
 /// # Errors
 /// If the surfaces do not face each other, or supports hold all slave nodes that do.
 pub fn pair(
+    comm: &dyn Comm,
     contact: usize,
     name: &str,
-    slave: &GatheredSurface,
-    master: &GatheredSurface,
+    slave: &Patch,
+    master: &Patch,
     held: HeldNodes,
 ) -> Result<(Conditions, Rule), ContactError> {
-    let quadratic = [slave, master].map(|surface| !surface.quadratic.is_empty());
-    match (matching::pair(contact, slave, master), quadratic) {
-        (Some(found), _) if found.pairs.is_empty() => Err(ContactError::Apart { name: name.to_owned() }),
-        (Some(found), [false, false]) => Ok((found, Rule::NodeToNode)),
-        (Some(found), [true, true]) => {
-            let gap = |pair: &ContactPair, along| quadratic::distance(slave, master, pair, along);
-            let count = found.pairs.len();
-            let pairs = quadratic::conditions(slave, found.pairs, gap);
-            assert_eq!(pairs.len(), count, "covered faces have all their corners");
-            Ok((Conditions { pairs, ..found }, Rule::NodeToNode))
-        }
-        _ => Ok((mortar::pair(contact, name, slave, master, &held(&slave.nodes))?, Rule::Mortar)),
+    match (matching(comm, contact, slave, master), [slave, master].map(|patch| patch.is_quadratic)) {
+        (Some(found), _) if found.count == 0 => Err(ContactError::Apart { name: name.to_owned() }),
+        (Some(found), [false, false] | [true, true]) => Ok((found, Rule::NodeToNode)),
+        _ => Ok((mortar(comm, contact, name, slave, master, held)?, Rule::Mortar)),
     }
+}
+
+/// Conditions node by node; `None` if the surfaces do not match. Collective.
+fn matching(comm: &dyn Comm, contact: usize, slave: &Patch, master: &Patch) -> Option<Conditions> {
+    let [one, other] = [slave, master].map(|patch| &patch.surface);
+    let opposite = master.near(comm, &matching::lines(one, other.spacing()));
+    let back = slave.near(comm, &matching::lines(other, one.spacing()));
+    let (facing, backwards) = (matching::facing(one, &opposite), matching::facing(other, &back));
+    let differs = facing.is_none() || backwards.is_none();
+    if sums(comm, [u64::from(differs)]) != [0] {
+        return None;
+    }
+    let mut found = matching::conditions(contact, one, &opposite, facing?);
+    if slave.is_quadratic && master.is_quadratic {
+        let gap = |pair: &ContactPair, along| quadratic::distance(one, &opposite, pair, along);
+        let count = found.pairs.len();
+        found.pairs = quadratic::conditions(one, found.pairs, gap);
+        assert_eq!(found.pairs.len(), count, "covered faces have all their corners");
+    }
+    [found.count] = sums(comm, [found.masters.len() as u64]).map(|count| count as usize);
+    Some(found)
+}
+
+/// Conditions against means. Collective.
+fn mortar(
+    comm: &dyn Comm,
+    contact: usize,
+    name: &str,
+    slave: &Patch,
+    master: &Patch,
+    held: HeldNodes,
+) -> Result<Conditions, ContactError> {
+    let one = &slave.surface;
+    let opposite = master.near(comm, &mortar::lines(one));
+    let (found, is_opposite) = mortar::conditions(contact, one, &opposite, &held(&one.nodes));
+    let all = sums(comm, [found.count as u64, found.held as u64, u64::from(is_opposite)]);
+    let [count, held, opposite] = all.map(|n| n as usize);
+    mortar::accept(name, Conditions { count, held, ..found }, opposite > 0)
 }
 
 /// As [`pair`], but chooses the slave: its index comes first. Collective.
@@ -50,18 +82,19 @@ pub fn pair(
 /// # Errors
 /// As there, for either surface as the slave.
 pub fn choose(
+    comm: &dyn Comm,
     contact: usize,
     name: &str,
-    surfaces: [&GatheredSurface; 2],
+    surfaces: [&Patch; 2],
     held: HeldNodes,
 ) -> Result<(usize, Conditions, Rule), ContactError> {
     let [one, other] = surfaces;
-    let first = pair(contact, name, one, other, held);
+    let first = pair(comm, contact, name, one, other, held);
     if let Ok((found, Rule::NodeToNode)) = first {
         return Ok((0, found, Rule::NodeToNode));
     }
-    let second = pair(contact, name, other, one, held);
-    let rank = |(found, _): &(Conditions, Rule)| (found.held > 0, usize::MAX - found.pairs.len());
+    let second = pair(comm, contact, name, other, one, held);
+    let rank = |(found, _): &(Conditions, Rule)| (found.held > 0, usize::MAX - found.count);
     match (first, second) {
         (Ok(first), Ok(second)) if rank(&second) < rank(&first) => Ok((1, second.0, second.1)),
         (Err(_), Ok((found, rule))) => Ok((1, found, rule)),
@@ -73,7 +106,9 @@ pub fn choose(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::comm::solo::Solo;
     use crate::contact::mortar::tests::grid;
+    use crate::contact::surface::GatheredSurface;
 
     /// Squares that face each other, of `n` x `n` and `m` x `m` cells.
     fn squares(n: usize, m: usize) -> [GatheredSurface; 2] {
@@ -86,7 +121,8 @@ mod tests {
             let all = all_held.contains(&nodes[0]);
             nodes.iter().map(|n| [false, false, all || all_held.contains(n)]).collect()
         };
-        let found = choose(0, "joint", [one, other], &held);
+        let [one, other] = [one, other].map(|surface| Patch::alone(surface.clone()));
+        let found = choose(&Solo, 0, "joint", [&one, &other], &held);
         found.ok().map(|(slave, found, rule)| (slave, found.pairs.len(), rule))
     }
 
@@ -108,10 +144,10 @@ mod tests {
 
     #[test]
     fn another_order_of_the_two_is_the_same_contact() {
-        let [fine, coarse] = squares(5, 3);
+        let [fine, coarse] = squares(5, 3).map(Patch::alone);
         let free = |nodes: &[u64]| vec![[false; 3]; nodes.len()];
-        let (slave, found, _) = choose(0, "joint", [&fine, &coarse], &free).expect("they face each other");
-        let (turned, same, _) = choose(0, "joint", [&coarse, &fine], &free).expect("they face each other");
+        let (slave, found, _) = choose(&Solo, 0, "joint", [&fine, &coarse], &free).expect("they face each other");
+        let (turned, same, _) = choose(&Solo, 0, "joint", [&coarse, &fine], &free).expect("they face each other");
         assert_eq!((slave, turned), (0, 1));
         assert_eq!(found, same);
     }

@@ -98,6 +98,7 @@ mod tests {
             triangles: quadratic.iter().flat_map(cut).collect(),
             share: 1.0,
             quadratic,
+            of: None,
         }
     }
 

@@ -9,8 +9,11 @@
 //! carries no condition, nor does a node beside a height field. Where the surface has an edge, both sides of it may face the
 //! obstacle: a node there has one condition, on the area of both.
 
-use super::surface::{GatheredSurface, unit};
-use super::{ContactError, ContactPair, quadratic};
+use std::collections::BTreeSet;
+
+use super::surface::{GatheredSurface, Layer, unit};
+use super::{Conditions, ContactError, ContactPair, quadratic};
+use crate::comm::{Comm, sums};
 use crate::scene::Obstacle;
 use crate::vector::{difference, dot};
 
@@ -23,18 +26,20 @@ const CENTRE: f64 = 1e-9;
 /// Share of a cell of a height field that a point may be beside the field.
 const BESIDE: f64 = 1e-9;
 
-/// Conditions of contact number `contact`, ascending by slave node.
+/// Conditions of contact number `contact`. Collective.
 ///
 /// # Errors
 /// If no node faces the obstacle.
 pub fn pair(
+    comm: &dyn Comm,
     contact: usize,
     name: &str,
     surface: &GatheredSurface,
     obstacle: &Obstacle,
-) -> Result<Vec<ContactPair>, ContactError> {
+) -> Result<Conditions, ContactError> {
     let nodes = surface.nodes.iter().zip(&surface.points).zip(surface.normals_and_areas());
-    let pairs = nodes.zip(&surface.parts).filter_map(|(((&slave, &point), (outward, area)), &part)| {
+    let own = nodes.zip(&surface.parts).enumerate().filter(|(index, _)| surface.layer(*index) == Layer::Own);
+    let pairs = own.filter_map(|(_, (((&slave, &point), (outward, area)), &part))| {
         let (normal, gap) = approach(obstacle, point, outward)?;
         let (slaves, masters) = (vec![(slave, 1.0)], Vec::new());
         let pair = ContactPair { contact, slave, part, slaves, masters, normal, gap, area, covered: true };
@@ -48,10 +53,14 @@ pub fn pair(
         first.area += if same { next.area } else { 0.0 };
         same
     });
-    if pairs.is_empty() {
-        return Err(ContactError::LooksAway { name: name.to_owned(), slaves: surface.nodes.chunk_by(u64::eq).count() });
+    let tells = |pair: &&ContactPair| surface.index(pair.slave, pair.part).is_some_and(|index| surface.tells(index));
+    let told = (0..surface.nodes.len()).filter(|&index| surface.tells(index)).map(|index| surface.nodes[index]);
+    let slaves = told.collect::<BTreeSet<u64>>().len();
+    let [count, slaves] = sums(comm, [pairs.iter().filter(tells).count() as u64, slaves as u64]).map(|n| n as usize);
+    if count == 0 {
+        return Err(ContactError::LooksAway { name: name.to_owned(), slaves });
     }
-    Ok(pairs)
+    Ok(Conditions { pairs, count, ..Conditions::default() })
 }
 
 /// The unit direction from a point straight into the obstacle, and the distance (negative inside). Where all directions
@@ -106,6 +115,7 @@ fn bilinear(at: [f64; 2], heights: &[Vec<f64>]) -> Option<(f64, [f64; 2])> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::comm::solo::Solo;
     use crate::random::Random;
 
     const UP: [f64; 3] = [0.0, 0.0, 1.0];
@@ -189,18 +199,18 @@ mod tests {
         let points = [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 0.0]];
         let roof = GatheredSurface::new(&[vec![4, 5, 6], vec![7, 6, 5]], &(4..).zip(points).collect());
         let wall = |x: f64, normal: f64| Obstacle::Plane { point: [x, 0.0, 0.0], normal: [normal, 0.0, 0.0] };
-        let right = pair(2, "wall", &roof, &wall(3.0, -1.0)).expect("one slope faces it");
+        let right = pair(&Solo, 2, "wall", &roof, &wall(3.0, -1.0)).expect("one slope faces it").pairs;
         let found = right.iter().map(|p| (p.contact, p.slave, p.gap)).collect::<Vec<_>>();
         assert_eq!(found, [(2, 5, 3.0), (2, 6, 3.0), (2, 7, 2.0)]);
         assert!(right.iter().all(|p| (p.area - 2.0_f64.sqrt() / 6.0).abs() < 1e-15), "{right:?}");
         // From above both slopes face it: nodes of the ridge have one condition, on both.
         let lid = Obstacle::Plane { point: [0.0, 0.0, 3.0], normal: [0.0, 0.0, -1.0] };
-        let above = pair(2, "lid", &roof, &lid).expect("both slopes face it");
+        let above = pair(&Solo, 2, "lid", &roof, &lid).expect("both slopes face it").pairs;
         let found = above.iter().map(|p| (p.slave, p.gap)).collect::<Vec<_>>();
         assert_eq!(found, [(4, 3.0), (5, 2.0), (6, 2.0), (7, 3.0)]);
         assert!((above[1].area - 2.0_f64.sqrt() / 3.0).abs() < 1e-15, "{above:?}");
         let floor = Obstacle::Plane { point: [0.0; 3], normal: UP };
-        let error = pair(2, "floor", &roof, &floor).unwrap_err();
+        let error = pair(&Solo, 2, "floor", &roof, &floor).unwrap_err();
         assert_eq!(error, ContactError::LooksAway { name: "floor".into(), slaves: 4 });
     }
 
@@ -222,7 +232,7 @@ mod tests {
         let roof = GatheredSurface::new(&faces, &(0..).zip(points).collect());
         assert_eq!(roof.nodes.len(), 12, "three nodes of the ridge have two parts");
         let lid = Obstacle::Plane { point: [0.0, 0.0, 3.0], normal: [0.0, 0.0, -1.0] };
-        let pairs = pair(0, "lid", &roof, &lid).expect("both slopes face it");
+        let pairs = pair(&Solo, 0, "lid", &roof, &lid).expect("both slopes face it").pairs;
         assert_eq!(pairs.iter().map(|p| p.slave).collect::<Vec<_>>(), (0..9).collect::<Vec<_>>());
         let area: f64 = pairs.iter().map(|p| p.area).sum();
         assert!((area - 2.0_f64.sqrt()).abs() < 1e-14, "{area}");

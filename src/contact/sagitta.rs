@@ -13,7 +13,11 @@
 use std::collections::BTreeMap;
 
 use super::ContactPair;
+use super::patch::Patch;
 use super::surface::GatheredSurface;
+use crate::comm::exact::exact_sums;
+use crate::comm::meeting::look_up;
+use crate::comm::{Comm, maximum, sums};
 use crate::mesh::surface::{area, normal, quadratic_normal};
 use crate::vector::{difference, dot};
 
@@ -53,17 +57,30 @@ struct Bend {
     curvature: f64,
 }
 
-/// The conditions of non-matching surfaces that are not resolved, if there are several.
-pub fn unresolved(slave: &GatheredSurface, master: &GatheredSurface, pairs: &[ContactPair]) -> Option<Unresolved> {
+/// The conditions of non-matching surfaces that are not resolved, if there are several. Collective.
+pub fn unresolved(comm: &dyn Comm, slave: &Patch, master: &Patch, pairs: &[ContactPair]) -> Option<Unresolved> {
+    let (slave, master) = (&slave.surface, &master.surface);
     let (of_slave, of_master) = (bends(slave), bends(master));
-    let at = |surface: &GatheredSurface, bends: &[Bend], node: u64| {
-        surface.nodes.binary_search(&node).map_or(Bend::default(), |index| bends[index])
+    let opposite = |pair: &ContactPair| pair.masters.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(node, _)| *node);
+    // Of a node with several parts the first counts, as look_up has it.
+    let bend = |index: usize| {
+        let Bend { sagitta, width, curvature } = of_master[index];
+        ([master.nodes[index]], [sagitta, width, curvature].map(f64::to_bits).to_vec())
     };
-    let (mut found, mut area) = (Unresolved { conditions: 0, sagitta: 0.0, distance: 0.0 }, 0.0);
-    for pair in pairs {
-        let Some(opposite) = pair.masters.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+    let known = (0..master.nodes.len()).filter(|&index| master.tells(index)).map(bend);
+    let told = |pair: &&ContactPair| slave.index(pair.slave, pair.part).is_some_and(|index| slave.tells(index));
+    let wanted = pairs.iter().filter(told).filter_map(opposite).map(|node| [node]);
+    let of_masters = look_up(comm, known, wanted);
+    let mut found = Unresolved { conditions: 0, sagitta: 0.0, distance: 0.0 };
+    let mut distances = Vec::new();
+    for pair in pairs.iter().filter(told) {
+        let Some([sagitta, width, curvature]) = opposite(pair).and_then(|node| {
+            of_masters.get(&[node]).and_then(|of| of.first_chunk::<3>()).map(|of| of.map(f64::from_bits))
+        }) else {
+            continue;
+        };
         let of_slave = slave.index(pair.slave, pair.part).map_or(Bend::default(), |index| of_slave[index]);
-        let sides = [of_slave, at(master, &of_master, opposite.0)];
+        let sides = [of_slave, Bend { sagitta, width, curvature }];
         let [one, other] = sides.map(|side| side.curvature);
         let sagitta = sides[0].sagitta.max(sides[1].sagitta);
         let is_alike = one * other < 0.0 && (one + other).abs() < ALIKE * one.abs().max(other.abs());
@@ -72,12 +89,13 @@ pub fn unresolved(slave: &GatheredSurface, master: &GatheredSurface, pairs: &[Co
             let off: f64 = sides.iter().map(|side| MEAN * side.sagitta * side.curvature.signum()).sum();
             found.conditions += 1;
             found.sagitta = found.sagitta.max(sagitta);
-            found.distance += pair.area * (distance - off);
-            area += pair.area;
+            distances.push([pair.area * (distance - off), pair.area]);
         }
     }
-    found.distance /= area;
-    (found.conditions >= SEVERAL).then_some(found)
+    let [distance, area] = exact_sums(comm, &distances);
+    let [conditions] = sums(comm, [found.conditions as u64]).map(|count| count as usize);
+    let found = Unresolved { conditions, sagitta: maximum(comm, &[found.sagitta])[0], distance: distance / area };
+    (conditions >= SEVERAL).then_some(found)
 }
 
 /// A face beside an edge: its normal in the middle of the edge, its centre and its width across the edge.
@@ -143,6 +161,7 @@ fn bend(one: &Beside, other: &Beside) -> Bend {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::comm::solo::Solo;
     use crate::contact::mortar;
     use crate::contact::mortar::tests::grid;
 
@@ -160,7 +179,7 @@ mod tests {
         let (inner, outer) = (strip(n, 100, true, RADIUS), strip(m, 900, false, socket));
         let held = vec![[false; 3]; inner.nodes.len()];
         let pairs = mortar::pair(0, "fit", &inner, &outer, &held).expect("they face each other").pairs;
-        unresolved(&inner, &outer, &pairs)
+        unresolved(&Solo, &Patch::alone(inner), &Patch::alone(outer), &pairs)
     }
 
     #[test]
@@ -184,6 +203,6 @@ mod tests {
         let inner = strip(6, 100, true, RADIUS);
         let held = vec![[false; 3]; inner.nodes.len()];
         let pairs = mortar::pair(0, "roll", &inner, &flat, &held).expect("they face each other").pairs;
-        assert_eq!(unresolved(&inner, &flat, &pairs), None);
+        assert_eq!(unresolved(&Solo, &Patch::alone(inner), &Patch::alone(flat), &pairs), None);
     }
 }

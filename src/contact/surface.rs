@@ -1,16 +1,15 @@
-//! A named surface, gathered from all subdomains.
+//! Triangles and nodes of a named surface, whole or as far as a rank needs it ([`super::patch`]).
 //!
 //! A node where the surface bends is there once for each smooth part around it ([`smooth`]), with the normal of that part.
 
 use std::collections::BTreeMap;
 
 use super::smooth;
-use crate::comm::{Comm, all_gather_u64};
-use crate::decomposition::Subdomain;
 use crate::mesh::surface::area_vector;
 use crate::vector::dot;
 
-/// Triangles and nodes of a surface, the same on every rank.
+/// Triangles and nodes of a surface.
+#[derive(Clone)]
 pub struct GatheredSurface {
     /// Global node numbers, ascending; those with several parts several times.
     pub nodes: Vec<u64>,
@@ -25,11 +24,44 @@ pub struct GatheredSurface {
     pub share: f64,
     /// Faces with quadratic shape functions: corners, then the middles of the edges between them. Each is four triangles.
     pub quadratic: Vec<[usize; 6]>,
+    /// What it is a part of; nothing if all of the surface is here.
+    pub of: Option<PartOf>,
+}
+
+/// What is known of a surface of which a part is here, and of that part.
+#[derive(Clone, Debug)]
+pub struct PartOf {
+    /// [`GatheredSurface::spacing`] of the whole.
+    pub spacing: f64,
+    /// [`GatheredSurface::diameter`] of the whole.
+    pub diameter: f64,
+    /// How far each node is from the rank's own faces: on one, on a face beside one, or further.
+    pub layers: Vec<Layer>,
+    /// Nodes that no lower rank has on a face of its own: what all ranks say of these is said once.
+    pub told: Vec<bool>,
+    /// Which triangles are of the rank's own faces.
+    pub own: Vec<bool>,
+}
+
+/// How much of the surface around a node is here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Layer {
+    /// On an own face; all faces around it, and all faces around these are here.
+    Own,
+    /// All faces around it are here.
+    Beside,
+    /// Some faces may be missing.
+    Rim,
 }
 
 impl GatheredSurface {
-    /// Gathers surface number `surface`. Triangles come in subdomain order, whatever the ranks. Collective.
-    pub fn gather(comm: &dyn Comm, subdomains: &[Subdomain], surface: usize) -> Self {
+    /// All of surface number `surface`, on every rank: what parts of it are compared with. Collective.
+    #[cfg(test)]
+    pub fn gather(
+        comm: &dyn crate::comm::Comm,
+        subdomains: &[crate::decomposition::Subdomain],
+        surface: usize,
+    ) -> Self {
         let mut mine = Vec::new();
         for subdomain in subdomains {
             for facet in subdomain.facets.iter().filter(|f| f.surface == surface) {
@@ -41,7 +73,7 @@ impl GatheredSurface {
             }
         }
         let (mut places, mut faces) = (BTreeMap::new(), Vec::new());
-        let mut all = all_gather_u64(comm, &mine).into_iter();
+        let mut all = crate::comm::all_gather_u64(comm, &mine).into_iter();
         while let Some(count) = all.next() {
             let mut corner = || {
                 let [node, x, y, z] = [(); 4].map(|()| all.next().expect("faces are whole"));
@@ -55,8 +87,12 @@ impl GatheredSurface {
 
     /// Of faces by their nodes, which have these places.
     pub fn new(faces: &[Vec<u64>], places: &BTreeMap<u64, [f64; 3]>) -> Self {
-        let parts = smooth::parts(faces, |node| places[&node]);
-        let slots = faces.iter().zip(&parts).map(|(face, parts)| face.iter().copied().zip(parts.iter().copied()));
+        Self::of_parts(faces, &smooth::parts(faces, |node| places[&node]), places)
+    }
+
+    /// As [`Self::new`], with the numbers of the smooth parts around the nodes of each face.
+    pub fn of_parts(faces: &[Vec<u64>], parts: &[Vec<u32>], places: &BTreeMap<u64, [f64; 3]>) -> Self {
+        let slots = faces.iter().zip(parts).map(|(face, parts)| face.iter().copied().zip(parts.iter().copied()));
         let mut listed: Vec<(u64, u32)> = slots.clone().flatten().collect();
         listed.sort_unstable();
         listed.dedup();
@@ -78,7 +114,7 @@ impl GatheredSurface {
         }
         let (nodes, parts): (Vec<u64>, Vec<u32>) = listed.into_iter().unzip();
         let points = nodes.iter().map(|node| places[node]).collect();
-        Self { nodes, parts, points, triangles, share, quadratic }
+        Self { nodes, parts, points, triangles, share, quadratic, of: None }
     }
 
     /// Index of a node on one of the smooth parts around it.
@@ -97,8 +133,26 @@ impl GatheredSurface {
         self.corners().map(|corners| area_vector(&corners))
     }
 
-    /// Diagonal of the bounding box.
+    /// How much of the surface around a node is here.
+    pub fn layer(&self, index: usize) -> Layer {
+        self.of.as_ref().map_or(Layer::Own, |of| of.layers[index])
+    }
+
+    /// Whether what is said of a node counts here, and not on another rank.
+    pub fn tells(&self, index: usize) -> bool {
+        self.of.as_ref().is_none_or(|of| of.told[index])
+    }
+
+    /// Whether a triangle is of this rank's own faces.
+    pub fn owns(&self, triangle: usize) -> bool {
+        self.of.as_ref().is_none_or(|of| of.own[triangle])
+    }
+
+    /// Diagonal of the bounding box of the whole surface.
     pub fn diameter(&self) -> f64 {
+        if let Some(of) = &self.of {
+            return of.diameter;
+        }
         let along = |a: usize| {
             let (low, high) = self
                 .points
@@ -110,8 +164,11 @@ impl GatheredSurface {
         dot(diagonal, diagonal).sqrt()
     }
 
-    /// Typical edge length: root of twice the mean triangle area.
+    /// Typical edge length of the whole surface: root of twice the mean triangle area.
     pub fn spacing(&self) -> f64 {
+        if let Some(of) = &self.of {
+            return of.spacing;
+        }
         let total: f64 = self.area_vectors().map(|v| dot(v, v).sqrt()).sum();
         (2.0 * total / self.triangles.len().max(1) as f64).sqrt()
     }

@@ -4,6 +4,7 @@
 //! ranks, and each rank owns a block of consecutive ones. A rank holds the meshes of its own subdomains only, and of
 //! the others just which of them share its nodes ([`interface`]). Where there are many, neighbouring ones form [`clusters`].
 
+mod beside;
 pub mod bricks;
 pub mod clusters;
 pub mod cost;

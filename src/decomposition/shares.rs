@@ -19,7 +19,7 @@ pub fn whole_groups(clusters: &Clusters, cost: impl Fn(usize) -> u64, ranks: usi
         first += count;
         clusters.begin(level, first) - begin
     });
-    Shares(subdomains.collect())
+    Shares::new(subdomains.collect())
 }
 
 /// Consecutive blocks of items over `ranks`, their costs as equal as a walk along the items makes them. Every rank has
@@ -43,7 +43,7 @@ pub fn by_cost(costs: &[u64], ranks: usize) -> Shares {
         left -= mine;
         at - first
     };
-    Shares((0..ranks).map(count).collect())
+    Shares::new((0..ranks).map(count).collect())
 }
 
 /// The items of several lists, given by their lengths, in an order in which every part of it has about the same part of
@@ -85,6 +85,14 @@ mod tests {
         assert_eq!(by_cost(&[1, 1, 1, 1, 1, 1, 3, 3], 2).0, [6, 2]);
         assert_eq!(by_cost(&[9, 9, 1, 1], 3).0, [1, 1, 2]);
         assert_eq!(by_cost(&[1, 1, 10], 3).0, [1, 1, 1]);
+    }
+
+    #[test]
+    fn owners_have_what_begins_with_them() {
+        let shares = Shares::new(vec![0, 2, 0, 3, 0]);
+        assert_eq!((0..5).map(|item| shares.owner(item)).collect::<Vec<_>>(), [1, 1, 3, 3, 3]);
+        assert_eq!((0..5).map(|rank| shares.begin(rank)).collect::<Vec<_>>(), [0, 0, 2, 2, 5]);
+        assert_eq!(shares.total(), 5);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{Decomposition, InterfaceNode};
-use crate::comm::{Comm, all_gather_u64};
+use crate::comm::Comm;
 
 /// Adds up what the copies of a node in subdomains of one material hold, in subdomain order: the same bits on every rank
 /// that has a copy.
@@ -26,15 +26,15 @@ enum Copy {
 impl<'a> NodeSums<'a> {
     /// For the nodes of a decomposition. Collective.
     pub fn new(comm: &'a dyn Comm, decomposition: &Decomposition) -> Self {
-        let owner = |&copy: &u32| decomposition.shares.owner(copy as usize);
+        let owner = |&copy: &u32| decomposition.owner(copy);
         let mine: Vec<u64> = decomposition.subdomains.iter().map(|s| s.material as u64).collect();
-        let materials = all_gather_u64(comm, &mine);
+        let materials = decomposition.of_neighbours(comm, &mine);
         let mut several = Vec::new();
         for InterfaceNode { node, copies, .. } in &decomposition.interface {
             let mut copies = copies.clone();
             // Stable: copies of one material stay in the order of their subdomains.
-            copies.sort_by_key(|&copy| materials[copy as usize]);
-            let of_one = copies.chunk_by(|&a, &b| materials[a as usize] == materials[b as usize]);
+            copies.sort_by_key(|copy| materials[copy]);
+            let of_one = copies.chunk_by(|a, b| materials[a] == materials[b]);
             let is_own = |copy: &u32| decomposition.own_index(*copy).is_some();
             several.extend(of_one.filter(|c| c.len() > 1 && c.iter().any(is_own)).map(|c| (*node, c.to_vec())));
         }

@@ -5,19 +5,19 @@ use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::Subdomain;
-use crate::comm::{Comm, all_gather_u64};
+use crate::comm::Comm;
+use crate::comm::meeting::count;
 
 /// A number for each own subdomain that has congruent ones, here or on other ranks: equal for the congruent ones among
 /// the own. Whether a subdomain has one does not depend on the ranks. Collective.
 pub fn twins(comm: &dyn Comm, subdomains: &[Subdomain]) -> Vec<Option<usize>> {
-    let mine: Vec<u64> = subdomains.iter().map(hash).collect();
-    let mut count: HashMap<u64, usize> = HashMap::new();
-    all_gather_u64(comm, &mine).into_iter().for_each(|hash| *count.entry(hash).or_default() += 1);
-    let mut kinds: HashMap<u64, Vec<usize>> = HashMap::new();
+    let mine: Vec<[u64; 1]> = subdomains.iter().map(|subdomain| [hash(subdomain)]).collect();
+    let all = count(comm, &mine);
+    let mut kinds: HashMap<[u64; 1], Vec<usize>> = HashMap::new();
     mine.iter()
         .enumerate()
         .map(|(own, hash)| {
-            if count[hash] == 1 {
+            if all[hash] == 1 {
                 return None;
             }
             let firsts = kinds.entry(*hash).or_default();
@@ -36,12 +36,11 @@ pub fn alike(comm: &dyn Comm, subdomains: &[Subdomain], boundaries: &[Vec<u32>])
     let kind = |(subdomain, boundary)| {
         let mut hasher = DefaultHasher::new();
         (hash(subdomain), boundary).hash(&mut hasher);
-        hasher.finish()
+        [hasher.finish()]
     };
-    let mine: Vec<u64> = subdomains.iter().zip(boundaries).map(kind).collect();
-    let mut count: HashMap<u64, usize> = HashMap::new();
-    all_gather_u64(comm, &mine).into_iter().for_each(|kind| *count.entry(kind).or_default() += 1);
-    mine.iter().map(|kind| count[kind]).collect()
+    let mine: Vec<[u64; 1]> = subdomains.iter().zip(boundaries).map(kind).collect();
+    let all = count(comm, &mine);
+    mine.iter().map(|kind| all[kind] as usize).collect()
 }
 
 fn congruent(a: &Subdomain, b: &Subdomain) -> bool {

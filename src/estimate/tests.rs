@@ -9,7 +9,7 @@ use crate::tensor::apply;
 
 /// Estimated and true error of a subdomain that is the whole body.
 fn errors(whole: &Subdomain, u: Vec<f64>, exact: &dyn Fn([f64; 3]) -> Voigt) -> [f64; 2] {
-    let shares = Shares(vec![1]);
+    let shares = Shares::new(vec![1]);
     let clusters = Clusters::new(shares.total(), &[]);
     let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
     let region = Region::virgin(whole, &orders::MATERIAL);

@@ -4,6 +4,7 @@ use super::ModelError;
 use super::contacts::Contacts;
 use crate::comm::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
+use crate::constraint::links::Linked;
 use crate::constraint::prescribed::Prescribed;
 use crate::constraint::{Constraints, Support, dirichlet};
 use crate::contact::{ContactError, ContactPair};
@@ -25,8 +26,6 @@ pub(super) struct Given<'a> {
     /// With the displacements that the scene gives.
     pub supports: &'a [Support],
     pub contacts: &'a Contacts,
-    /// Young's modulus of each subdomain, of all ranks.
-    pub stiffness: &'a [f64],
 }
 
 /// The rows of B, and their right-hand sides over the history, which are all that changes. Collective.
@@ -37,8 +36,9 @@ pub(super) fn constraints(
     scene: &Scene,
     comm: &dyn Comm,
     given: &Given,
+    linked: Linked,
 ) -> Result<(Constraints, RightHandSides), ModelError> {
-    let &Given { decomposition, supports, contacts, stiffness } = given;
+    let &Given { decomposition, supports, contacts } = given;
     let agreed = |at: &Prescribed| {
         let outcome = dirichlet::check(comm, &decomposition.interface, supports, at);
         agree(comm, "supports", outcome).map_err(ModelError::Supports)
@@ -46,8 +46,8 @@ pub(super) fn constraints(
     let steps = scene.steps();
     let at = given.prescribed(scene, Some(&steps[0]));
     agreed(&at)?;
-    let constraints = Constraints::new(comm, decomposition, supports, &contacts.pairs, stiffness, &at);
-    refuse_held(comm, contacts, &constraints.idle_distances(&at))?;
+    let constraints = Constraints::new(decomposition, supports, &contacts.pairs, linked, &at);
+    refuse_held(comm, given, &constraints.idle_distances(&at))?;
     let first = constraints.right_hand_sides(&at);
 
     let displacements = supports.iter().map(|s| s.displacement);
@@ -59,7 +59,7 @@ pub(super) fn constraints(
     let right_hand_sides = |step: Option<&Step>| {
         let at = given.prescribed(scene, step);
         agreed(&at)?;
-        refuse_held(comm, contacts, &constraints.idle_distances(&at))?;
+        refuse_held(comm, given, &constraints.idle_distances(&at))?;
         Ok::<_, ModelError>(constraints.right_hand_sides(&at))
     };
     let begin = right_hand_sides(None)?;
@@ -88,7 +88,7 @@ impl Given<'_> {
         };
         Prescribed {
             displacements: self.supports.iter().map(of_support).collect(),
-            gaps: self.contacts.pairs.iter().map(gap).collect(),
+            gaps: self.contacts.pairs.iter().map(|(number, pair)| (number, gap(pair))).collect(),
         }
     }
 }
@@ -99,19 +99,32 @@ const HELD_OVERLAP: f64 = 1e-6;
 /// Refuses contacts that supports violate, given the distances that are left on this rank, by pair. Collective.
 fn refuse_held(
     comm: &dyn Comm,
-    Contacts { names, pairs, .. }: &Contacts,
+    &Given { decomposition, contacts: Contacts { names, pairs, .. }, .. }: &Given,
     distances: &[(usize, f64)],
 ) -> Result<(), ContactError> {
-    let mine: Vec<u64> = distances.iter().flat_map(|&(pair, left)| [pair as u64, left.to_bits()]).collect();
+    // A pair counts where its slave node has the lowest copy.
+    let interface = &decomposition.interface;
+    let is_first = |pair: &ContactPair| {
+        let at = interface.binary_search_by_key(&pair.slave, |node| node.node);
+        at.is_ok_and(|at| decomposition.own_index(interface[at].copies[0]).is_some())
+    };
+    let (mut nodes, mut depths) = (vec![0_u64; names.len()], vec![0.0_f64; names.len()]);
+    for &(number, left) in distances {
+        let (pair, depth) = (&pairs[number], -left);
+        if is_first(pair) && depth > HELD_OVERLAP * pair.area.sqrt() {
+            nodes[pair.contact] += 1;
+            depths[pair.contact] = depths[pair.contact].max(depth);
+        }
+    }
+    let mine: Vec<u64> = nodes.into_iter().zip(depths).flat_map(|(n, depth)| [n, depth.to_bits()]).collect();
     let all = all_gather_u64(comm, &mine);
-    let mut depths: Vec<(usize, f64)> =
-        all.chunks_exact(2).map(|idle| (idle[0] as usize, -f64::from_bits(idle[1]))).collect();
-    depths.sort_by_key(|(pair, _)| *pair);
-    depths.dedup_by_key(|(pair, _)| *pair);
-    depths.retain(|&(pair, depth)| depth > HELD_OVERLAP * pairs[pair].area.sqrt());
-    let Some(&(first, _)) = depths.first() else { return Ok(()) };
-    let contact = pairs[first].contact;
-    let of_contact = || depths.iter().filter(|(pair, _)| pairs[*pair].contact == contact);
-    let depth = of_contact().fold(0.0_f64, |deepest, (_, depth)| deepest.max(*depth));
-    Err(ContactError::Held { name: names[contact].clone(), nodes: of_contact().count(), depth })
+    let of = |contact: usize| all.as_chunks::<2>().0.iter().skip(contact).step_by(names.len());
+    for (contact, name) in names.iter().enumerate() {
+        let nodes = of(contact).map(|[nodes, _]| *nodes as usize).sum();
+        if nodes > 0 {
+            let depth = of(contact).fold(0.0_f64, |deepest, [_, depth]| deepest.max(f64::from_bits(*depth)));
+            return Err(ContactError::Held { name: name.clone(), nodes, depth });
+        }
+    }
+    Ok(())
 }

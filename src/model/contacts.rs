@@ -1,11 +1,14 @@
 //! The contacts of a scene: their conditions, and what is told of them.
 
-use super::extent::{self, Extent, Site};
-use crate::comm::Comm;
+use std::collections::BTreeMap;
+
+use super::extent::{self, Extent};
+use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{Support, dirichlet};
+use crate::contact::known::{Found, Pairs, spread};
 use crate::contact::pairing::{self, Rule};
-use crate::contact::surface::GatheredSurface;
-use crate::contact::{Conditions, ContactError, ContactPair, MasterNode, corner, rigid, sagitta};
+use crate::contact::patch::Patch;
+use crate::contact::{ContactError, ContactPair, MasterNode, corner, rigid, sagitta};
 use crate::decomposition::Decomposition;
 use crate::record::counts::ContactRow;
 use crate::scene::{Contact, Scene, Sides, SurfaceName};
@@ -17,80 +20,109 @@ pub struct Contacts {
     pub names: Vec<String>,
     /// Indices of the surfaces in contact, contact by contact.
     pub surfaces: Vec<usize>,
-    /// Pairs of all contacts.
-    pub pairs: Vec<ContactPair>,
-    /// Nodes of all master surfaces that have slaves opposite, by the indices of these pairs.
+    /// Pairs of all contacts: those of the rows that this rank holds.
+    pub pairs: Pairs,
+    /// Own nodes of master surfaces that have slaves opposite, by the numbers of these pairs.
     pub masters: Vec<MasterNode>,
-    /// Where each of the pairs is.
-    pub sites: Vec<Site>,
+    /// Contacts that have a node in common with another one.
+    pub sharing: Vec<usize>,
     /// How each contact was paired.
     pub rows: Vec<ContactRow>,
 }
 
-/// Pairs all contacts; the texts are what the user should know. `index` numbers the surfaces of the decomposition, `extents`
-/// are those of the bodies. Collective.
+/// What contacts are made of.
+pub(super) struct Given<'a> {
+    pub scene: &'a Scene,
+    pub decomposition: &'a Decomposition,
+    pub supports: &'a [Support],
+    /// Of the bodies.
+    pub extents: &'a [Extent],
+    /// Nodes of all bodies.
+    pub nodes: u64,
+}
+
+/// Pairs all contacts; the texts are what the user should know. `index` numbers the surfaces of the decomposition. Collective.
 ///
 /// # Errors
 /// If a contact has no pairs, or obstacles are too many for a node.
 pub(super) fn pair(
-    scene: &Scene,
     comm: &dyn Comm,
-    decomposition: &Decomposition,
-    supports: &[Support],
-    extents: &[Extent],
+    given: &Given,
     index: impl Fn(&SurfaceName) -> usize,
 ) -> Result<(Contacts, Vec<String>), ContactError> {
-    let gather = |s: &SurfaceName| GatheredSurface::gather(comm, &decomposition.subdomains, index(s));
-    let held = |nodes: &[u64]| dirichlet::fixed_at(comm, &decomposition.interface, supports, nodes);
+    let &Given { scene, decomposition, supports, nodes, .. } = given;
     let mut all = Contacts {
         names: scene.contact.keys().cloned().collect(),
         surfaces: scene.contact.values().flat_map(Contact::surfaces).map(&index).collect(),
         ..Contacts::default()
     };
-    let mut warnings = Vec::new();
+    let (mut found, mut warnings) = (Vec::new(), Vec::new());
     for (number, (name, contact)) in scene.contact.iter().enumerate() {
-        let surfaces: Vec<(&SurfaceName, GatheredSurface)> = contact.surfaces().map(|s| (s, gather(s))).collect();
-        let (slave, Conditions { mut pairs, mut masters, .. }, rule) = match (&contact.sides, &surfaces[..]) {
-            (Sides::Rigid { obstacle, .. }, [(_, slave), ..]) => {
-                let pairs = rigid::pair(number, name, slave, obstacle)?;
-                (0, Conditions { pairs, ..Conditions::default() }, "rigid")
-            }
-            (Sides::Named { .. }, [(_, slave), (_, master)]) => {
-                let (found, rule) = pairing::pair(number, name, slave, master, &held)?;
-                (0, found, rule_name(rule))
-            }
-            (Sides::Either(_), [(_, one), (_, other)]) => {
-                let (slave, found, rule) = pairing::choose(number, name, [one, other], &held)?;
-                (slave, found, rule_name(rule))
-            }
-            _ => unreachable!("two sides have two surfaces"),
-        };
-        for pair in &mut pairs {
-            pair.gap = contact.clearance.unwrap_or(pair.gap + contact.gap);
-        }
-        if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
-            let found = sagitta::unresolved(&surfaces[slave].1, &master.1, &pairs);
-            warnings.extend(found.map(|found| extent::unresolved(name, &found, pairs.len())));
-        }
-        let sites = extent::sites(&surfaces[slave].1, &pairs);
-        let extent = |body: &String| &extents[scene.body.keys().position(|known| known == body).expect("it exists")];
-        let bodies: Vec<_> = surfaces.iter().map(|(surface, _)| (&surface.body, extent(&surface.body))).collect();
-        warnings.extend(extent::overlap(name, &pairs, &sites, &bodies));
-        all.rows.push(ContactRow {
-            name: name.clone(),
-            slave: surfaces[slave].0.to_string(),
-            master: surfaces.get(1).map(|_| surfaces[1 - slave].0.to_string()),
-            rule: rule.to_owned(),
-            conditions: pairs.len() as u64,
-        });
-        let first = all.pairs.len();
-        masters.iter_mut().flat_map(|node| &mut node.pairs).for_each(|(pair, _)| *pair += first);
-        all.masters.extend(masters);
-        all.pairs.extend(pairs);
-        all.sites.extend(sites);
+        let (of_contact, row, told) = one(comm, given, (number, name, contact), &index)?;
+        found.push(of_contact);
+        all.rows.push(row);
+        warnings.extend(told);
     }
-    corner::check(&all.names, &all.pairs, held)?;
+    (all.pairs, all.masters) = spread(comm, decomposition, nodes, found);
+    all.sharing = sharing(comm, &all);
+    // The rank of the lowest copy of a slave node has all its conditions.
+    let interface = &decomposition.interface;
+    let is_first = |pair: &&ContactPair| {
+        let at = interface.binary_search_by_key(&pair.slave, |node| node.node);
+        at.is_ok_and(|at| decomposition.own_index(interface[at].copies[0]).is_some())
+    };
+    let own = all.pairs.iter().map(|(_, pair)| pair).filter(is_first);
+    corner::check(comm, &all.names, own, |nodes| dirichlet::fixed_here(interface, supports, nodes))?;
     Ok((all, warnings))
+}
+
+/// One contact: its conditions, how they were found, and what to tell of it. Collective.
+fn one(
+    comm: &dyn Comm,
+    &Given { scene, decomposition, supports, extents, .. }: &Given,
+    (number, name, contact): (usize, &String, &Contact),
+    index: impl Fn(&SurfaceName) -> usize,
+) -> Result<(Found, ContactRow, Vec<String>), ContactError> {
+    let held = |nodes: &[u64]| dirichlet::fixed_at(comm, &decomposition.interface, supports, nodes);
+    let patch = |s| (s, Patch::new(comm, decomposition, index(s)));
+    let surfaces: Vec<(&SurfaceName, Patch)> = contact.surfaces().map(patch).collect();
+    let (slave, mut conditions, rule) = match (&contact.sides, &surfaces[..]) {
+        (Sides::Rigid { obstacle, .. }, [(_, slave), ..]) => {
+            (0, rigid::pair(comm, number, name, &slave.surface, obstacle)?, "rigid")
+        }
+        (Sides::Named { .. }, [(_, slave), (_, master)]) => {
+            let (found, rule) = pairing::pair(comm, number, name, slave, master, &held)?;
+            (0, found, rule_name(rule))
+        }
+        (Sides::Either(_), [(_, one), (_, other)]) => {
+            let (slave, found, rule) = pairing::choose(comm, number, name, [one, other], &held)?;
+            (slave, found, rule_name(rule))
+        }
+        _ => unreachable!("two sides have two surfaces"),
+    };
+    for pair in &mut conditions.pairs {
+        pair.gap = contact.clearance.unwrap_or(pair.gap + contact.gap);
+    }
+    let (mut warnings, pairs, patch) = (Vec::new(), &conditions.pairs, &surfaces[slave].1);
+    if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
+        let found = sagitta::unresolved(comm, patch, &master.1, pairs);
+        warnings.extend(found.map(|found| extent::unresolved(name, &found, conditions.count)));
+    }
+    let sites = extent::sites(&patch.surface, pairs);
+    let extent = |body: &String| &extents[scene.body.keys().position(|known| known == body).expect("it exists")];
+    let bodies: Vec<_> = surfaces.iter().map(|(surface, _)| (&surface.body, extent(&surface.body))).collect();
+    warnings.extend(extent::overlap(comm, name, pairs, &sites, &bodies));
+    let row = ContactRow {
+        name: name.clone(),
+        slave: surfaces[slave].0.to_string(),
+        master: surfaces.get(1).map(|_| surfaces[1 - slave].0.to_string()),
+        rule: rule.to_owned(),
+        conditions: conditions.count as u64,
+    };
+    let tells =
+        |pair: &ContactPair| patch.surface.index(pair.slave, pair.part).is_some_and(|index| patch.surface.tells(index));
+    let told = pairs.iter().map(tells).collect();
+    Ok((Found { conditions, sites, told }, row, warnings))
 }
 
 fn rule_name(rule: Rule) -> &'static str {
@@ -98,4 +130,20 @@ fn rule_name(rule: Rule) -> &'static str {
         Rule::NodeToNode => "node to node",
         Rule::Mortar => "mortar",
     }
+}
+
+/// Contacts that have a node in common with another one, on any rank. Collective.
+fn sharing(comm: &dyn Comm, Contacts { names, pairs, masters, .. }: &Contacts) -> Vec<usize> {
+    let slaves = pairs.iter().filter(|(_, pair)| pair.covered).map(|(_, pair)| (pair.slave, pair.contact));
+    let masters = masters.iter().map(|master| (master.node, master.contact));
+    let mut of_node: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+    slaves.chain(masters).for_each(|(node, contact)| of_node.entry(node).or_default().push(contact));
+    let mut shares = vec![0_u64; names.len()];
+    for contacts in of_node.values().filter(|contacts| contacts.iter().any(|contact| *contact != contacts[0])) {
+        contacts.iter().for_each(|contact| shares[*contact] = 1);
+    }
+    let all = all_gather_u64(comm, &shares);
+    (0..names.len())
+        .filter(|contact| all.iter().skip(*contact).step_by(names.len()).any(|shares| *shares == 1))
+        .collect()
 }

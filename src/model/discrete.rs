@@ -9,6 +9,7 @@ use super::extent::{self, Extent};
 use super::meshes::{MeshError, Meshes};
 use crate::assembly::loads::Load;
 use crate::comm::Comm;
+use crate::constraint::links::Linked;
 use crate::constraint::{Constraints, Support};
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
 use crate::material::{Law, Material};
@@ -78,20 +79,22 @@ pub fn discretise_expecting(
     // What holds, touches and loads them.
     let supports: Vec<Support> = scene.support.iter().map(|(name, s)| support(name, s, &named)).collect();
     let extents = extent::extents(comm, &decomposition.subdomains, bodies.len());
-    let index = |name: &SurfaceName| named.index(name);
-    let (contacts, of_contacts) = contacts::pair(scene, comm, &decomposition, &supports, &extents, index)?;
+    let given = contacts::Given {
+        scene,
+        decomposition: &decomposition,
+        supports: &supports,
+        extents: &extents,
+        nodes: bodies.iter().map(|body| body.counts().nodes).sum(),
+    };
+    let (mut contacts, of_contacts) = contacts::pair(comm, &given, |name| named.index(name))?;
     warnings.extend(of_contacts);
     let loads = scene.load.values().map(|it| load(scene, it, &named)).collect();
 
     // Rows of B.
     let young: Vec<f64> = decomposition.subdomains.iter().map(|s| materials[s.material].hooke().young).collect();
-    let given = conditions::Given {
-        decomposition: &decomposition,
-        supports: &supports,
-        contacts: &contacts,
-        stiffness: &comm.all_gather(&young, &decomposition.shares.counts(1)),
-    };
-    let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given)?;
+    let linked = Linked::new(comm, &decomposition, &mut contacts.pairs, &young);
+    let given = conditions::Given { decomposition: &decomposition, supports: &supports, contacts: &contacts };
+    let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given, linked)?;
     let surfaces = named.surfaces;
     Ok(Discrete {
         bodies,

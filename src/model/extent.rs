@@ -3,10 +3,10 @@
 //! Two sides may overlap at the start by a tenth of the extent that the thinner body has along the normal: closing the overlap
 //! strains that body by so much, and the theory is of small strains.
 
-use crate::comm::Comm;
-use crate::contact::ContactPair;
+use crate::comm::{Comm, all_gather_u64};
 use crate::contact::sagitta::Unresolved;
 use crate::contact::surface::GatheredSurface;
+use crate::contact::{ContactPair, Site};
 use crate::decomposition::Subdomain;
 use crate::vector::{difference, length};
 
@@ -14,15 +14,6 @@ use crate::vector::{difference, length};
 pub type Extent = [[f64; 3]; 2];
 
 const OVERLAP: f64 = 0.1;
-
-/// Where a contact condition is.
-#[derive(Clone, Copy, Debug)]
-pub struct Site {
-    /// Place of the slave node.
-    pub place: [f64; 3],
-    /// Longest edge of the facets around it.
-    pub facet: f64,
-}
 
 /// The sites of conditions on a surface.
 pub fn sites(surface: &GatheredSurface, pairs: &[ContactPair]) -> Vec<Site> {
@@ -63,16 +54,34 @@ pub fn extents(comm: &dyn Comm, subdomains: &[Subdomain], bodies: usize) -> Vec<
     extents
 }
 
-/// What to tell of a contact whose sides overlap too deeply at the start; `bodies` are those of its sides.
-pub fn overlap(name: &str, pairs: &[ContactPair], sites: &[Site], bodies: &[(&String, &Extent)]) -> Option<String> {
+/// What to tell of a contact whose sides overlap too deeply at the start, on any rank; `bodies` are those of its sides. Collective.
+pub fn overlap(
+    comm: &dyn Comm,
+    name: &str,
+    pairs: &[ContactPair],
+    sites: &[Site],
+    bodies: &[(&String, &Extent)],
+) -> Option<String> {
     let relative = |(pair, site): (&ContactPair, &Site)| {
         let along = |[low, high]: &Extent| (0..3).map(|a| pair.normal[a].abs() * (high[a] - low[a])).sum::<f64>();
-        let thin = bodies.iter().map(|(name, extent)| (along(extent), *name)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let depth = -pair.gap;
-        (depth > OVERLAP * thin.0).then_some((depth / thin.0, depth, thin, site.place))
+        let extents = bodies.iter().enumerate().map(|(body, (_, extent))| (along(extent), body));
+        let (thin, body) = extents.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (depth, [x, y, z]) = (-pair.gap, site.place);
+        let found = Overlap {
+            numbers: [depth / thin, depth, thin, x, y, z],
+            of: [pair.slave, u64::from(pair.part), body as u64],
+        };
+        (depth > OVERLAP * thin).then_some(found)
     };
-    let found = pairs.iter().zip(sites).filter_map(relative);
-    let (share, depth, (extent, body), place) = found.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
+    let mine = pairs.iter().zip(sites).filter_map(relative).reduce(Overlap::worse);
+    let packed = mine.map(|Overlap { numbers, of }| [&numbers.map(f64::to_bits)[..], &of].concat()).unwrap_or_default();
+    let all = all_gather_u64(comm, &packed);
+    let unpacked = all.as_chunks::<9>().0.iter().map(|&[a, b, c, d, e, f, slave, part, body]| Overlap {
+        numbers: [a, b, c, d, e, f].map(f64::from_bits),
+        of: [slave, part, body],
+    });
+    let Overlap { numbers: [share, depth, extent, x, y, z], of: [.., body] } = unpacked.reduce(Overlap::worse)?;
+    let (body, place) = (bodies[body as usize].0, [x, y, z]);
     Some(format!(
         "contact.{name}: its sides overlap by {} near {}, {} of the {} that body {body} extends there; small strains allow \
          {OVERLAP} of it: check the places of the bodies, gap and clearance",
@@ -81,6 +90,22 @@ pub fn overlap(name: &str, pairs: &[ContactPair], sites: &[Site], bodies: &[(&St
         short(share),
         short(extent),
     ))
+}
+
+/// A condition whose sides overlap too deeply.
+struct Overlap {
+    /// The share of the thinner body's extent, the depth, that extent, the place.
+    numbers: [f64; 6],
+    /// Slave node, part, and which side is thinner.
+    of: [u64; 3],
+}
+
+impl Overlap {
+    /// The larger share; of equal ones that of the first condition.
+    fn worse(self, other: Self) -> Self {
+        let [one, next] = [&self, &other].map(|overlap| overlap.numbers[0]);
+        if next > one || (next == one && other.of < self.of) { other } else { self }
+    }
 }
 
 /// What to tell of a contact whose facets do not resolve its gaps.

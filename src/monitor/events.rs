@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::table::PhaseTable;
-use crate::record::counts::{ContactRow, Sizes};
+use crate::record::counts::{ContactRow, HeldRow, Sizes};
 use crate::record::rows::NewtonRow;
 use crate::record::state::{Errors, Residuals};
 
@@ -35,6 +35,13 @@ pub enum Event {
         megabytes: f64,
         /// What their hosts have left, in MiB, where that is known.
         available_mb: Option<f64>,
+    },
+    /// What a rank would hold, from `check --ranks`.
+    Held {
+        /// Number of ranks.
+        ranks: usize,
+        /// Item by item.
+        rows: Vec<HeldRow>,
     },
     /// An increment of the load is tried; where it leads to.
     Increment(String),

@@ -69,7 +69,7 @@ mod tests {
             let timer = Timer::start();
             let metered = Metered::new(comm, &timer);
             let rank = comm.rank();
-            let sum = ordered_sum(&metered, &Shares(vec![1; 3]), &[rank as f64, 1.0], 2);
+            let sum = ordered_sum(&metered, &Shares::new(vec![1; 3]), &[rank as f64, 1.0], 2);
             assert_eq!(sum, [3.0, 3.0]);
             let mut incoming = vec![vec![0.0; 4]];
             if rank < 2 {

@@ -5,7 +5,7 @@
 
 use super::events::{Event, Sink};
 use super::table::{Phase, PhaseTable, Spread};
-use crate::record::counts::{ContactRow, Sizes, Work};
+use crate::record::counts::{ContactRow, HeldRow, Sizes, Work};
 use crate::record::rows::NewtonRow;
 use crate::record::state::{Errors, Residuals};
 
@@ -40,6 +40,7 @@ impl Plain {
                 let left = left.unwrap_or_default();
                 vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together{left}", "memory estimate")]
             }
+            Event::Held { ranks, rows } => held_lines(*ranks, rows),
             Event::NewtonStep(row) => {
                 let header = (!std::mem::replace(&mut self.newton_header_written, true)).then(newton_header);
                 header.into_iter().chain([newton_line(row)]).collect()
@@ -88,6 +89,16 @@ fn size_lines(scene: &str, level: usize, ranks: usize, sizes: &Sizes) -> Vec<Str
         line("primal unknowns", about("primal_dofs", sizes.primal_dofs), String::new()),
         line("dual unknowns", about("dual_dofs", sizes.dual_dofs), rows),
     ]
+}
+
+/// What one of so many ranks holds, and all of it.
+fn held_lines(ranks: usize, rows: &[HeldRow]) -> Vec<String> {
+    let line = |item: &str, owned: f64, everywhere: f64| format!("  {item:<24}{owned:>14.3}{everywhere:>14.3}");
+    let sum = |of: fn(&HeldRow) -> f64| rows.iter().map(of).sum::<f64>();
+    let header = format!("  {:<24}{:>14}{:>14}", format!("MiB on each of {ranks}"), "its share", "on every rank");
+    let rows_of = rows.iter().map(|row| line(&row.item, row.owned_mb, row.everywhere_mb));
+    let all = line("all", sum(|row| row.owned_mb), sum(|row| row.everywhere_mb));
+    std::iter::once(header).chain(rows_of).chain([all]).collect()
 }
 
 fn contact_line(ContactRow { name, slave, master, rule, conditions }: &ContactRow) -> String {

@@ -13,8 +13,10 @@ pub struct Sizes {
     pub elements: u64,
     /// Subdomains.
     pub subdomains: u64,
-    /// Clusters of them that have six rigid motions in the coarse problem: as many where each has its own.
+    /// Clusters of subdomains: as many where each is one.
     pub clusters: u64,
+    /// Groups on the highest level, with six rigid motions each in the coarse problem.
+    pub coarse_blocks: u64,
     /// Those with a triangle on a contact surface.
     pub contact_subdomains: u64,
     /// Displacements of the torn problem.
@@ -44,6 +46,17 @@ pub struct ContactRow {
     pub rule: String,
     /// Slave nodes with a condition.
     pub conditions: u64,
+}
+
+/// What a rank holds of an item.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct HeldRow {
+    /// Its name.
+    pub item: String,
+    /// The rank's share, in MiB.
+    pub owned_mb: f64,
+    /// What every rank holds, in MiB.
+    pub everywhere_mb: f64,
 }
 
 /// Work done by the QP solver in all Newton steps.

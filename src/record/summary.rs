@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::counts::{CommunicationRow, ContactRow, Counters, Sizes, Work};
+use super::counts::{CommunicationRow, ContactRow, Counters, HeldRow, Sizes, Work};
 use super::rows::{CascadeRow, NewtonRow, StepRow};
 use super::state::State;
 
@@ -62,6 +62,10 @@ pub struct Summary {
     pub memory_estimate_mb: Option<f64>,
     /// What the hosts of the run have left, in MiB; from `check` only.
     pub memory_available_mb: Option<f64>,
+    /// What a rank would hold, item by item; from `check --ranks` only.
+    pub memory_of_rank: Vec<HeldRow>,
+    /// Ranks that this is for.
+    pub memory_ranks: Option<usize>,
     /// Why the run failed.
     pub error: Option<String>,
     /// What the user should know.

@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn every_rank_is_named() {
         let entries = threads::run(3, |comm| {
-            collect(comm, "title = \"a\"", "", &Shares(vec![2, 0, 1]), UNIX_EPOCH).into_iter().collect::<Vec<_>>()
+            collect(comm, "title = \"a\"", "", &Shares::new(vec![2, 0, 1]), UNIX_EPOCH).into_iter().collect::<Vec<_>>()
         });
         let text = |name: &str| entries[0].iter().find(|(n, _)| n == name).map(|(_, t)| t.clone()).unwrap();
         assert_eq!(text("subdomains_per_rank"), "2 0 1");

@@ -10,36 +10,46 @@
 //!
 //! Congruent boxes share factors as long as they are elastic; how many remain so nobody knows before, `SHARED` is taken where
 //! a material may yield. Every rank has the coarse problem's factors, for all rows and for those of the active set:
-//! `COARSE` `n^1.4` numbers each for `n` clusters, as `bench-results/kernels.md` has it for 250 to 21,296.
+//! `COARSE` `n^1.4` numbers each for `n` clusters, as `bench-results/kernels.md` has it for 250 to 21,296. Where rows of
+//! contact are coupled, every rank at the contact has all of them.
 //!
 //! Constants are from runs of the benchmark on one rank, with each element, in boxes and in parts: at level 2 the estimate is 0.75
 //! to 1.3 times what runs took. The paper's boxes at levels 1 to 4 on two ranks take 0.94 to 1.19 of it.
 
+use super::held::Item;
 use crate::material::Law;
+use crate::record::counts::HeldRow;
 use crate::scene::{Precision, Preconditioner, Scene};
 
-/// Memory of a run, in MiB.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Memory of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Memory {
-    /// Of all subdomains together, wherever they are.
-    pub subdomains_mb: f64,
-    /// On every rank.
-    pub rank_mb: f64,
-    /// On rank 0 while meshes are cut, before anything else is there.
+    /// What ranks hold while solving.
+    pub items: Vec<Item>,
+    /// On rank 0 while meshes are cut, before anything else is there, in MiB.
     pub cutting_mb: f64,
 }
 
 impl Memory {
-    /// Of all ranks together.
+    /// Of all ranks together, in MiB.
     pub fn total_mb(&self, ranks: usize) -> f64 {
         let cutting = self.cutting_mb + PROCESS_MB * ranks as f64;
-        (self.subdomains_mb + self.rank_mb * ranks as f64).max(cutting)
+        (ranks as f64 * self.solving_mb(ranks)).max(cutting)
     }
 
-    /// Of a rank with its part of the subdomains.
+    /// Of a rank with its part of the subdomains, in MiB.
     pub fn of_rank_mb(&self, rank: usize, ranks: usize) -> f64 {
-        let solving = self.subdomains_mb / ranks as f64 + self.rank_mb;
+        let solving = self.solving_mb(ranks);
         if rank == 0 { solving.max(self.cutting_mb + PROCESS_MB) } else { solving }
+    }
+
+    /// What a rank of so many owns and what all of them hold, item by item.
+    pub fn held(&self, ranks: usize) -> Vec<HeldRow> {
+        self.items.iter().map(|item| item.row(ranks)).collect()
+    }
+
+    fn solving_mb(&self, ranks: usize) -> f64 {
+        megabytes(self.items.iter().map(|item| item.of_rank(ranks)).sum())
     }
 }
 
@@ -47,14 +57,23 @@ impl Memory {
 pub(super) const PROCESS_MB: f64 = 45.0;
 /// Numbers in the factor of the coarse problem, for one cluster.
 const COARSE: f64 = 190.0;
-/// What every rank knows of each subdomain (its body, place, owner and stiffness), in bytes.
+/// What every rank knows of each subdomain (its cluster, body, place and owner), in bytes.
 const KNOWN: f64 = 100.0;
-/// What every rank knows of each contact condition, in bytes.
+/// What a rank knows of a contact condition, in bytes.
 const CONDITION: f64 = 400.0;
+/// Ranks that know a condition that is coupled to few others: those of the slave's node and of the master's.
+const SIDES: f64 = 2.0;
+/// What every rank at the contact knows of a condition that is coupled to the others: itself, its row, and the gluing of its nodes,
+/// in bytes.
+const COUPLED: f64 = 3000.0;
+/// What every rank knows of each rank: the subdomains that it owns and lengths of messages; of a surface in contact its boxes.
+const OF_RANK: [f64; 2] = [64.0, 500.0];
 /// Part of the factors of congruent boxes that is held, if a material may yield, and if none may.
 const SHARED: [f64; 2] = [0.5, 0.125];
 /// Numbers for each unknown, if a material may yield, and if none may.
 const VECTORS: [f64; 2] = [110.0, 45.0];
+/// Numbers for each unknown among these that are the mesh: places twice, numbers of nodes, elements by their nodes.
+const MESH: f64 = 6.0;
 /// Unknowns from which a factor in single precision does not pass its probe.
 const IN_DOUBLE: f64 = 7500.0;
 /// Numbers that a slot of a row takes: that of `G'` and the row's term.
@@ -71,25 +90,81 @@ pub(super) struct Lengths {
     pub unknowns: f64,
 }
 
-/// Numbers that a subdomain takes, which may be one of congruent boxes.
-pub(super) fn of_subdomain(scene: &Scene, Lengths { factor, matrix, unknowns }: Lengths, is_box: bool) -> f64 {
-    let is_elastic = usize::from(!scene.material.values().any(Law::yields));
-    let (held, index) = if is_box { (SHARED[is_elastic], 1.5) } else { (1.0, 2.8) };
-    let precision = if scene.solver.precision == Precision::Mixed { 0.5 } else { 1.0 };
-    let whole = if unknowns > IN_DOUBLE { 1.0 } else { precision };
-    let interior = if scene.solver.preconditioner == Preconditioner::Dirichlet { 0.5 * precision } else { 0.0 };
-    held * (whole + interior) * factor + index * matrix + VECTORS[is_elastic] * unknowns
+/// Numbers that subdomains take: their mesh, factors, matrices, vectors (with tangents, histories and results), bonds of
+/// groups, and slots of their rows.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Numbers(pub [f64; 6]);
+
+impl Numbers {
+    /// Of a subdomain, which may be one of congruent boxes.
+    pub fn of_subdomain(scene: &Scene, Lengths { factor, matrix, unknowns }: Lengths, is_box: bool) -> Self {
+        let is_elastic = usize::from(!scene.material.values().any(Law::yields));
+        let (held, index) = if is_box { (SHARED[is_elastic], 1.5) } else { (1.0, 2.8) };
+        let precision = if scene.solver.precision == Precision::Mixed { 0.5 } else { 1.0 };
+        let whole = if unknowns > IN_DOUBLE { 1.0 } else { precision };
+        let interior = if scene.solver.preconditioner == Preconditioner::Dirichlet { 0.5 * precision } else { 0.0 };
+        let (factors, vectors) = (held * (whole + interior) * factor, (VECTORS[is_elastic] - MESH) * unknowns);
+        Self([MESH * unknowns, factors, index * matrix, vectors, 0.0, 0.0])
+    }
+
+    /// Of the inverse of a group of so many members, where no other group is like it.
+    pub fn of_group(members: f64) -> Self {
+        Self([0.0, 0.0, 0.0, 0.0, (6.0 * (members - 1.0)).powi(2), 0.0])
+    }
+
+    /// Of slots of rows.
+    pub fn of_slots(slots: f64) -> Self {
+        Self([0.0, 0.0, 0.0, 0.0, 0.0, SLOT * slots])
+    }
+
+    /// Of so many like these.
+    pub fn times(self, count: f64) -> Self {
+        Self(self.0.map(|numbers| count * numbers))
+    }
 }
 
-/// What every rank takes; the largest factor in its subdomains is worked on in double precision, beside the interior's.
-pub(super) fn of_rank_mb(subdomains: f64, clusters: f64, conditions: f64, largest: f64) -> f64 {
-    let coarse = 2.0 * 8.0 * COARSE * clusters.powf(1.4);
-    PROCESS_MB + megabytes(coarse + 12.0 * largest + KNOWN * subdomains + CONDITION * conditions)
+impl std::ops::AddAssign for Numbers {
+    fn add_assign(&mut self, other: Self) {
+        self.0.iter_mut().zip(other.0).for_each(|(sum, numbers)| *sum += numbers);
+    }
 }
 
-/// Numbers in the inverse of a group of so many members, where no other group is like it.
-pub(super) fn of_group(members: f64) -> f64 {
-    (6.0 * (members - 1.0)).powi(2)
+/// Counts that the memory of a run depends on.
+pub(super) struct Held {
+    /// Of all subdomains.
+    pub numbers: Numbers,
+    pub subdomains: f64,
+    /// Groups on the highest level.
+    pub coarse_blocks: f64,
+    /// Conditions of contacts whose rows are in small blocks, and of those that are coupled ([`super::held::is_coupled`]).
+    pub conditions: [f64; 2],
+    /// Surfaces in contact.
+    pub surfaces: f64,
+    /// Length of the largest factor.
+    pub largest: f64,
+}
+
+impl Held {
+    /// The items; the largest factor in its subdomains is worked on in double precision, beside the interior's.
+    pub fn items(&self) -> Vec<Item> {
+        let [meshes, factors, matrices, vectors, bonds, slots] = self.numbers.0.map(|numbers| 8.0 * numbers);
+        let [single, coupled] = self.conditions;
+        vec![
+            Item::owned("meshes", meshes),
+            Item::owned("factors", factors),
+            Item::owned("matrices", matrices),
+            Item::owned("vectors and results", vectors),
+            Item::owned("bonds in groups", bonds),
+            Item::owned("rows", slots),
+            Item::owned("contact pairs", SIDES * CONDITION * single),
+            Item::everywhere("process", PROCESS_MB * f64::from(1 << 20)),
+            Item::everywhere("work on a factor", 12.0 * self.largest),
+            Item::a_rank("lists of ranks", OF_RANK[0] + OF_RANK[1] * self.surfaces),
+            Item::everywhere("coupled contact", COUPLED * coupled),
+            Item::everywhere("coarse problem", 2.0 * 8.0 * COARSE * self.coarse_blocks.powf(1.4)),
+            Item::everywhere("lists of clusters", KNOWN * self.subdomains),
+        ]
+    }
 }
 
 pub(super) fn megabytes(bytes: f64) -> f64 {

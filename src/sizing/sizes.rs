@@ -2,10 +2,12 @@
 
 use std::rc::Rc;
 
-use super::memory::{self, Lengths, Memory, PROCESS_MB, SLOT};
-use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use super::held::is_coupled;
+use super::memory::{Held, Lengths, Memory, Numbers, PROCESS_MB};
+use crate::comm::exact::exact_sums;
+use crate::comm::{Comm, maximum};
 use crate::constraint::Kind;
-use crate::decomposition::{Clusters, Cut};
+use crate::decomposition::{Cut, Decomposition};
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::factor::{Symbolic, analyse};
 use crate::model::discrete::{Discrete, cut};
@@ -15,6 +17,7 @@ use crate::scene::Scene;
 /// Counts what a discrete problem consists of, in the paper's way. Collective.
 pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
     let Discrete { decomposition, constraints, bodies, .. } = discrete;
+    let clusters = &decomposition.clusters;
     let space = RowSpace::new(comm, &decomposition.shares, constraints);
     let mut partial = Vec::new();
     for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
@@ -35,7 +38,8 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
         cells: bodies.iter().map(|b| b.counts().cells).sum(),
         elements: bodies.iter().map(|b| b.counts().elements).sum(),
         subdomains: decomposition.shares.total() as u64,
-        clusters: decomposition.clusters.total() as u64,
+        clusters: clusters.count(clusters.levels().min(1)) as u64,
+        coarse_blocks: clusters.total() as u64,
         contact_subdomains: sum[4],
         primal_dofs: sum[0],
         gluing_rows: sum[1],
@@ -57,22 +61,38 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
         Lengths { factor, matrix, unknowns }
     };
     let lengths: Vec<Lengths> = analyse(&decomposition.subdomains).iter().map(lengths).collect();
-    let numbers: f64 = lengths.iter().map(|&lengths| memory::of_subdomain(scene, lengths, is_box)).sum();
+    let of_subdomains = lengths.iter().map(|&lengths| Numbers::of_subdomain(scene, lengths, is_box));
+    let groups = if is_box { Vec::new() } else { members_of_groups(decomposition) };
+    let groups = groups.into_iter().map(|members| Numbers::of_group(members as f64));
+    // Each block counts once, where its lowest subdomain is.
+    let blocks = constraints.blocks.iter().zip(&constraints.block_subdomains);
+    let owned = blocks.filter(|(_, subdomains)| decomposition.own_index(subdomains[0]).is_some());
+    let slots = owned.map(|(rows, _)| constraints.slot_begin[rows.end] - constraints.slot_begin[rows.start]);
+    let slots = slots.map(|slots| Numbers::of_slots(slots.into()));
+    let rows: Vec<_> = of_subdomains.chain(groups).chain(slots).map(|numbers| numbers.0).collect();
+    let numbers = Numbers(exact_sums(comm, &rows));
     let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
-    let slots = SLOT * constraints.slot_subdomain.len() as f64;
-    let mine = memory::megabytes(8.0 * (numbers + slots));
-    let groups = if is_box { 0.0 } else { groups(&decomposition.clusters) };
-    let [subdomains, clusters] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
-    Memory {
-        subdomains_mb: ordered_sum(comm, &Shares(vec![1; comm.size()]), &[mine], 1)[0]
-            + memory::megabytes(8.0 * groups),
-        rank_mb: memory::of_rank_mb(subdomains, clusters, contacts.pairs.len() as f64, largest),
-        cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)),
-    }
+    let coupled = scene.contact.values().zip(&contacts.rows);
+    let coupled = coupled.filter(|(contact, row)| is_coupled(scene, contact, row.rule != "mortar"));
+    let coupled = coupled.map(|(_, row)| row.conditions as f64).sum::<f64>();
+    let [subdomains, coarse_blocks] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
+    let held = Held {
+        numbers,
+        subdomains,
+        coarse_blocks,
+        conditions: [contacts.pairs.total() as f64 - coupled, coupled],
+        surfaces: contacts.surfaces.len() as f64,
+        largest,
+    };
+    Memory { items: held.items(), cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)) }
 }
 
-/// Numbers in the inverses of groups' members, if none are alike.
-fn groups(clusters: &Clusters) -> f64 {
-    let of_level = |level: usize| (0..clusters.count(level)).map(move |group| clusters.children(level, group).len());
-    (1..=clusters.levels()).flat_map(of_level).map(|members| memory::of_group(members as f64)).sum()
+/// How many members the groups have whose first subdomain is the rank's.
+fn members_of_groups(decomposition: &Decomposition) -> Vec<usize> {
+    let Decomposition { clusters, .. } = decomposition;
+    let first = decomposition.subdomains.first().map_or(0, |subdomain| subdomain.id);
+    let own = first..first + decomposition.subdomains.len();
+    let of_level =
+        |level: usize| clusters.beginning(level, own.clone()).map(move |group| clusters.children(level, group).len());
+    (1..=clusters.levels()).flat_map(of_level).collect()
 }

@@ -8,9 +8,11 @@ use std::collections::{HashMap, HashSet};
 
 use super::Solved;
 use crate::assembly::{Region, internal};
+use crate::comm::meeting::look_up;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::Kind;
 use crate::contact::ContactPair;
+use crate::contact::known::Pairs;
 use crate::decomposition::Cut;
 use crate::decomposition::{BodyMesh, Subdomain, bricks};
 use crate::feti::Torn;
@@ -29,9 +31,9 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
         (&coarse.bodies, &coarse.decomposition.subdomains, &solved.u),
         (&fine.bodies, &fine.decomposition.subdomains),
     );
-    let (from, to) = ((&coarse.bodies[..], &coarse.contacts.pairs[..]), (&fine.bodies[..], &fine.contacts.pairs[..]));
+    let (from, to) = ((&coarse.bodies[..], &coarse.contacts.pairs), (&fine.bodies[..], &fine.contacts.pairs));
     let closed = closed_contacts(comm, from, &solved.closed, to);
-    let kept = |kind| if let Kind::Contact { pair } = kind { closed[pair] } else { true };
+    let kept = |kind| if let Kind::Contact { pair } = kind { closed.contains(&pair) } else { true };
     newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect() }
 }
 
@@ -120,21 +122,19 @@ fn fetch(comm: &dyn Comm, subdomains: &[Subdomain], u: &Torn, needed: HashSet<u6
     answers.chunks_exact(4).map(|a| (a[0], [a[1], a[2], a[3]].map(f64::from_bits))).collect()
 }
 
-/// Which fine contact pairs are closed: those where the coarse node nearest to the slave node is the slave node of a closed
-/// coarse pair. `closed` are the indices of this rank's closed coarse pairs. Collective.
+/// Which of this rank's fine contact pairs are closed: those where the coarse node nearest to the slave node is the slave node of
+/// a closed coarse pair. `closed` are the numbers of this rank's closed coarse pairs. Collective.
 fn closed_contacts(
     comm: &dyn Comm,
-    coarse: (&[BodyMesh], &[ContactPair]),
+    coarse: (&[BodyMesh], &Pairs),
     closed: &[u64],
-    fine: (&[BodyMesh], &[ContactPair]),
-) -> Vec<bool> {
+    fine: (&[BodyMesh], &Pairs),
+) -> HashSet<usize> {
     let (coarse_bodies, coarse_pairs) = coarse;
     let (fine_bodies, fine_pairs) = fine;
-    let closed: HashSet<(usize, u64)> = all_gather_u64(comm, closed)
-        .into_iter()
-        .map(|pair| &coarse_pairs[pair as usize])
-        .map(|pair| (pair.contact, pair.slave))
-        .collect();
+    let key = |pair: &ContactPair, slave: u64| [pair.contact as u64, slave];
+    let closed = closed.iter().map(|&pair| &coarse_pairs[pair as usize]);
+    let closed: HashSet<[u64; 2]> = closed.map(|pair| key(pair, pair.slave)).collect();
     let nearest = |node: u64| {
         let body = fine_bodies.iter().rposition(|body| body.first_node <= node).expect("a node is in a body");
         let (first, coarse_first) = (fine_bodies[body].first_node, coarse_bodies[body].first_node);
@@ -143,7 +143,10 @@ fn closed_contacts(
         let place = std::array::from_fn(|a| (2 * at[a] * coarse.cells[a] + fine.cells[a]) / (2 * fine.cells[a]));
         coarse_first + coarse.node(place)
     };
-    fine_pairs.iter().map(|pair| closed.contains(&(pair.contact, nearest(pair.slave)))).collect()
+    let wanted: HashSet<[u64; 2]> = fine_pairs.iter().map(|(_, pair)| key(pair, nearest(pair.slave))).collect();
+    let found = look_up(comm, closed.into_iter().map(|key| (key, Vec::new())), wanted);
+    let is_closed = |pair: &ContactPair| found.contains_key(&key(pair, nearest(pair.slave)));
+    fine_pairs.iter().filter(|(_, pair)| is_closed(pair)).map(|(number, _)| number).collect()
 }
 
 #[cfg(test)]
@@ -219,7 +222,7 @@ mod tests {
             let body = &d.bodies[1];
             brick(body).coordinates(brick(body).node_position(pair.slave - body.first_node))
         };
-        let closed: Vec<u64> = (0..coarse.contacts.pairs.len() as u64)
+        let closed: Vec<u64> = (0..coarse.contacts.pairs.total() as u64)
             .filter(|&k| place(&coarse, &coarse.contacts.pairs[k as usize])[0] < 2.5)
             .collect();
         let found = closed_contacts(
@@ -228,9 +231,9 @@ mod tests {
             &closed,
             (&fine.bodies, &fine.contacts.pairs),
         );
-        assert!(found.contains(&true) && found.contains(&false));
-        for (pair, found) in fine.contacts.pairs.iter().zip(found) {
-            assert_eq!(found, place(&fine, pair)[0] < 2.5, "{:?}", place(&fine, pair));
+        assert!((1..fine.contacts.pairs.total()).contains(&found.len()));
+        for (number, pair) in fine.contacts.pairs.iter() {
+            assert_eq!(found.contains(&number), place(&fine, pair)[0] < 2.5, "{:?}", place(&fine, pair));
         }
     }
 }

@@ -5,7 +5,7 @@
 //! shows the largest of its pressures and the smallest of its gaps; where contacts share nodes each has a field of its own beside
 //! these. Nodes beyond the edge of the other surface touch nothing, and show nothing.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
 use crate::constraint::law::Status;
 use crate::contact::MasterNode;
@@ -49,8 +49,8 @@ pub fn fields(subdomains: &[Subdomain], touching: &Contacts, states: &[ContactSt
         Field::scalar("contact_gap", gap),
         Field::integer("contact_status", status),
     ];
-    for contact in sharing(touching) {
-        let pressure = of(&|pair| touching.pairs[pair].contact == contact).pressure;
+    for &contact in &touching.sharing {
+        let pressure = of(&|of| of == contact).pressure;
         // Names in HDF5 have no slash.
         let name = touching.names[contact].replace('/', "_");
         fields.push(Field::scalar(&format!("contact_pressure_{name}"), pressure));
@@ -58,65 +58,57 @@ pub fn fields(subdomains: &[Subdomain], touching: &Contacts, states: &[ContactSt
     fields
 }
 
-/// Contacts that have a node in common with another one.
-fn sharing(Contacts { names, pairs, masters, .. }: &Contacts) -> Vec<usize> {
-    let slaves = pairs.iter().filter(|pair| pair.covered).map(|pair| (pair.slave, pair.contact));
-    let masters = masters.iter().map(|node| (node.node, pairs[node.pairs[0].0].contact));
-    let mut of_node: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
-    slaves.chain(masters).for_each(|(node, contact)| of_node.entry(node).or_default().push(contact));
-    let mut shares = vec![false; names.len()];
-    for contacts in of_node.values().filter(|contacts| contacts.iter().any(|contact| *contact != contacts[0])) {
-        contacts.iter().for_each(|contact| shares[*contact] = true);
-    }
-    (0..shares.len()).filter(|contact| shares[*contact]).collect()
-}
-
 /// What a rank knows of contact, by node.
 struct Known<'a> {
     /// All nodes of both sides, ascending.
     nodes: Vec<u64>,
-    /// Nodes of slave surfaces with the states of their conditions, ascending.
-    slaves: Vec<(u64, &'a ContactState)>,
+    /// Nodes of slave surfaces with the contacts and the states of their conditions, ascending.
+    slaves: Vec<(u64, usize, &'a ContactState)>,
     /// Nodes of master surfaces, ascending.
     masters: Vec<&'a MasterNode>,
-    /// Pressure of each condition; zero where its row is on other ranks.
-    pressures: Vec<f64>,
+    /// Pressure of each condition whose row is on this rank.
+    pressures: HashMap<usize, f64>,
 }
 
 impl<'a> Known<'a> {
     fn new(Contacts { pairs, masters, .. }: &'a Contacts, states: &'a [ContactState]) -> Self {
-        let mut pressures = vec![0.0; pairs.len()];
-        states.iter().for_each(|state| pressures[state.pair] = state.force / pairs[state.pair].area);
+        let pressures = states.iter().map(|state| (state.pair, state.force / pairs[state.pair].area)).collect();
         let covered = states.iter().filter(|state| pairs[state.pair].covered);
-        let mut slaves: Vec<_> = covered.map(|state| (pairs[state.pair].slave, state)).collect();
-        slaves.sort_by_key(|(node, state)| (*node, state.pair));
+        let mut slaves: Vec<_> =
+            covered.map(|state| (pairs[state.pair].slave, pairs[state.pair].contact, state)).collect();
+        slaves.sort_by_key(|(node, _, state)| (*node, state.pair));
         let mut masters: Vec<&MasterNode> = masters.iter().collect();
         masters.sort_by_key(|master| master.node);
-        let nodes = slaves.iter().map(|(node, _)| *node).chain(masters.iter().map(|master| master.node));
+        let nodes = slaves.iter().map(|(node, ..)| *node).chain(masters.iter().map(|master| master.node));
         let mut nodes: Vec<u64> = nodes.collect();
         nodes.sort_unstable();
         nodes.dedup();
         Self { nodes, slaves, masters, pressures }
     }
 
-    /// Contact at the nodes of a subdomain, of the conditions that are wanted.
+    /// Pressure of a condition; zero where its row is on other ranks.
+    fn pressure(&self, pair: usize) -> f64 {
+        self.pressures.get(&pair).copied().unwrap_or_default()
+    }
+
+    /// Contact at the nodes of a subdomain, of the contacts that are wanted.
     fn at_nodes(&self, subdomain: &Subdomain, wanted: &dyn Fn(usize) -> bool) -> AtNodes {
         let mut found = AtNodes::nothing(subdomain.nodes.len());
         // Copies of a node show the same, also where a subdomain has no face of the surface.
         let touches = |(_, node): &(usize, &u64)| self.nodes.binary_search(node).is_ok();
         for (local, &node) in subdomain.nodes.iter().enumerate().filter(touches) {
-            let slaves = &self.slaves[self.slaves.partition_point(|(known, _)| *known < node)..];
-            let slaves = slaves.iter().take_while(|(known, _)| *known == node).map(|(_, state)| state);
-            for state in slaves.filter(|state| wanted(state.pair)) {
-                found.pressure[local] = found.pressure[local].max(self.pressures[state.pair]);
+            let slaves = &self.slaves[self.slaves.partition_point(|(known, ..)| *known < node)..];
+            let slaves = slaves.iter().take_while(|(known, ..)| *known == node);
+            for (.., state) in slaves.filter(|(_, contact, _)| wanted(*contact)) {
+                found.pressure[local] = found.pressure[local].max(self.pressure(state.pair));
                 // `min` takes the number of a number and none.
                 found.gap[local] = state.gap.min(found.gap[local]);
                 found.status[local] = found.status[local].max(state.status as i64);
             }
             let masters = &self.masters[self.masters.partition_point(|master| master.node < node)..];
             let masters = masters.iter().take_while(|master| master.node == node);
-            for master in masters.filter(|master| wanted(master.pairs[0].0)) {
-                let mean = master.pairs.iter().map(|&(pair, weight)| weight * self.pressures[pair]).sum();
+            for master in masters.filter(|master| wanted(master.contact)) {
+                let mean = master.pairs.iter().map(|&(pair, weight)| weight * self.pressure(pair)).sum();
                 found.pressure[local] = found.pressure[local].max(mean);
             }
         }

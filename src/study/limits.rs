@@ -19,13 +19,15 @@ use std::collections::{BTreeSet, HashMap};
 
 use super::contact::ContactState;
 use crate::assembly::gradients;
-use crate::comm::{Comm, all_gather_u64};
+use crate::comm::Comm;
+use crate::comm::meeting::look_up;
 use crate::constraint::Kind;
 use crate::constraint::law::Status;
+use crate::contact::Site;
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
 use crate::model::discrete::Discrete;
-use crate::model::extent::{Site, diagonal, short, shown};
+use crate::model::extent::{diagonal, short, shown};
 use crate::newton::Newton;
 use crate::newton::path::At;
 use crate::record::rows::StepRow;
@@ -75,17 +77,20 @@ pub(super) fn measure(
     contact: &[ContactState],
 ) -> Measures {
     let (problem, at, u) = (newton.problem(), newton.at(), &newton.iterate().u);
-    let of_nodes = displacements(comm, discrete, u);
-    let mut state_of = vec![None; discrete.contacts.pairs.len()];
-    contact.iter().for_each(|state| state_of[state.pair] = Some(state.status));
+    let status: HashMap<usize, Status> = contact.iter().map(|state| (state.pair, state.status)).collect();
+    let closed = |row: usize| match problem.constraints.rows[row].kind {
+        Kind::Contact { pair } => Some(pair).filter(|pair| status.get(pair).is_some_and(|status| status.is_closed())),
+        _ => None,
+    };
+    let owned = problem.space.owned();
+    let of_nodes = displacements(comm, discrete, u, owned.iter().cloned().flatten().filter_map(closed));
     let mut partial = Vec::new();
-    let subdomains = problem.subdomains.iter().zip(u).zip(problem.space.owned());
+    let subdomains = problem.subdomains.iter().zip(u).zip(owned);
     for ((subdomain, u), rows) in subdomains {
         let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
         add_body(&mut worst, subdomain, u, diagonal(&discrete.extents[subdomain.body]));
         for row in rows.clone() {
-            let Kind::Contact { pair } = problem.constraints.rows[row].kind else { continue };
-            if state_of[pair].is_some_and(Status::is_closed) {
+            if let Some(pair) = closed(row) {
                 add_contact(&mut worst, scene, discrete, pair, at, &of_nodes);
             }
         }
@@ -139,14 +144,14 @@ fn add_contact(
     discrete: &Discrete,
     index: usize,
     at: At,
-    of_nodes: &HashMap<u64, [f64; 3]>,
+    of_nodes: &HashMap<[u64; 1], Vec<u64>>,
 ) {
-    let (pair, Site { place, facet }) = (&discrete.contacts.pairs[index], discrete.contacts.sites[index]);
+    let (pair, Site { place, facet }) = (&discrete.contacts.pairs[index], discrete.contacts.pairs.site(index));
     let (name, contact) = scene.contact.iter().nth(pair.contact).expect("a pair belongs to a contact");
     let masters = pair.masters.iter().map(|(node, weight)| (*node, -weight));
     let moved = contact.displacement().map(|d| -d * obstacle_factor(scene, name, at));
     let motion = pair.slaves.iter().copied().chain(masters).fold(moved, |sum, (node, weight)| {
-        let u = of_nodes.get(&node).copied().unwrap_or_default();
+        let u = of_nodes.get(&[node]).map_or([0.0; 3], |u| std::array::from_fn(|a| f64::from_bits(u[a])));
         std::array::from_fn(|a| sum[a] + weight * u[a])
     });
     let along = dot(motion, pair.normal);
@@ -166,22 +171,27 @@ fn obstacle_factor(scene: &Scene, name: &str, at: At) -> f64 {
     begin + at.fraction * (end - begin)
 }
 
-/// Displacements of the nodes on surfaces in contact, those of the first subdomain that has them. Collective.
-fn displacements(comm: &dyn Comm, discrete: &Discrete, u: &Torn) -> HashMap<u64, [f64; 3]> {
+/// Displacements, as bits, of the nodes of these pairs, those of the first subdomain that has a face there. Collective.
+fn displacements(
+    comm: &dyn Comm,
+    discrete: &Discrete,
+    u: &Torn,
+    pairs: impl Iterator<Item = usize>,
+) -> HashMap<[u64; 1], Vec<u64>> {
     let mut mine = Vec::new();
     for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(u) {
         let facets = subdomain.facets.iter().filter(|facet| discrete.contacts.surfaces.contains(&facet.surface));
         let nodes: BTreeSet<u32> = facets.flat_map(|facet| facet.nodes.iter().copied()).collect();
         for node in nodes.into_iter().map(|node| node as usize) {
-            mine.push(subdomain.nodes[node]);
-            mine.extend(u[3 * node..3 * node + 3].iter().map(|x| x.to_bits()));
+            let bits = u[3 * node..3 * node + 3].iter().map(|x| x.to_bits()).collect();
+            mine.push(([subdomain.nodes[node]], bits));
         }
     }
-    let mut found = HashMap::new();
-    for &[node, x, y, z] in all_gather_u64(comm, &mine).as_chunks::<4>().0 {
-        found.entry(node).or_insert([x, y, z].map(f64::from_bits));
-    }
-    found
+    let nodes = pairs.flat_map(|pair| {
+        let pair = &discrete.contacts.pairs[pair];
+        pair.slaves.iter().chain(&pair.masters).map(|(node, _)| [*node])
+    });
+    look_up(comm, mine, nodes.collect::<BTreeSet<[u64; 1]>>())
 }
 
 /// The rounding of coordinates over the largest stretch of a body. It matters to contacts only.
@@ -189,7 +199,7 @@ fn rounding(scene: &Scene, discrete: &Discrete, of_bodies: &[Worst]) -> Option<E
     let coordinates = discrete.extents.iter().flatten().flatten();
     let farthest = coordinates.fold(0.0_f64, |farthest, x| farthest.max(x.abs()));
     let Worst { value: stretch, of, place } = of_bodies[3];
-    let is_strained = of_bodies[0].value > NO_STRAIN && stretch.is_finite() && !discrete.contacts.pairs.is_empty();
+    let is_strained = of_bodies[0].value > NO_STRAIN && stretch.is_finite() && discrete.contacts.pairs.total() > 0;
     let name = || scene.body.keys().nth(of).cloned().unwrap_or_default();
     is_strained.then(|| Extreme { value: f64::EPSILON * farthest / stretch, of: name(), at: place })
 }

@@ -1,5 +1,7 @@
 //! What is told of a solution: rows of the log, contact states, the summary.
 
+use std::collections::HashMap;
+
 use super::contact::ContactState;
 use super::limits;
 use crate::comm::Comm;
@@ -245,15 +247,14 @@ fn contact_forces(
     };
     let signs = scene.contact.values().zip(rows).map(|of| if is_slave(of) { 1.0 } else { -1.0 });
     let signs: Vec<f64> = signs.collect();
-    let mut of_pair = vec![None; pairs.len()];
-    contact.iter().for_each(|state| of_pair[state.pair] = Some(state.force));
+    let of_pair: HashMap<usize, f64> = contact.iter().map(|state| (state.pair, state.force)).collect();
     let mut partial = Vec::new();
     for rows in problem.space.owned() {
         let mut sums = vec![[0.0; 3]; names.len()];
         for row in rows.clone() {
             if let Kind::Contact { pair } = problem.constraints.rows[row].kind {
                 let contact = pairs[pair].contact;
-                let force = pairs[pair].force(of_pair[pair].unwrap_or_default());
+                let force = pairs[pair].force(of_pair.get(&pair).copied().unwrap_or_default());
                 sums[contact].iter_mut().zip(force).for_each(|(sum, f)| *sum += signs[contact] * f);
             }
         }

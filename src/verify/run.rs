@@ -1,10 +1,11 @@
 //! A solved case, and its distance from a closed form.
 
+use std::collections::BTreeMap;
+
 use super::{Case, End, Error, Row};
 use crate::assembly::Region;
 use crate::assembly::loads::Load;
-use crate::comm::{Comm, maximum, ordered_sum};
-use crate::contact::ContactPair;
+use crate::comm::{Comm, all_gather_u64, maximum, ordered_sum};
 use crate::decomposition::Subdomain;
 use crate::element::Kind;
 use crate::element::sample::{Sample, samples};
@@ -209,24 +210,24 @@ impl<'a> Run<'a> {
     /// All contact conditions: place of the slave node, pressure, and the area it acts on. Collective.
     pub fn contacts(&self) -> Vec<Touch> {
         let found = self.solved.piece.last("contact_pressure").expect("results have this field");
-        let mut mine = vec![f64::NEG_INFINITY; 4 * self.discrete.contacts.pairs.len()];
-        let mut first = 0;
+        let (mut mine, mut first) = (Vec::new(), 0);
         for (subdomain, _) in self.subdomains() {
-            for (pair, mine) in self.discrete.contacts.pairs.iter().zip(mine.as_chunks_mut::<4>().0) {
+            for (number, pair) in self.discrete.contacts.pairs.iter() {
                 if let Some(node) = subdomain.local_node(pair.slave) {
                     let [x, y, z] = subdomain.points[node];
-                    *mine = [x, y, z, found[first + node]];
+                    mine.push(number as u64);
+                    mine.extend([x, y, z, found[first + node], pair.area].map(f64::to_bits));
                 }
             }
             first += subdomain.nodes.len();
         }
-        let all = if mine.is_empty() { mine } else { maximum(self.comm, &mine) };
-        let touch = |(pair, [x, y, z, pressure]): (&ContactPair, &[f64; 4])| Touch {
-            place: [*x, *y, *z],
-            pressure: *pressure,
-            area: pair.area,
-        };
-        self.discrete.contacts.pairs.iter().zip(all.as_chunks::<4>().0).map(touch).collect()
+        // All copies of a node show the same.
+        let all = all_gather_u64(self.comm, &mine);
+        let touches = all.as_chunks::<6>().0.iter().map(|&[number, x, y, z, pressure, area]| {
+            let [x, y, z, pressure, area] = [x, y, z, pressure, area].map(f64::from_bits);
+            (number, Touch { place: [x, y, z], pressure, area })
+        });
+        touches.collect::<BTreeMap<u64, Touch>>().into_values().collect()
     }
 }
 

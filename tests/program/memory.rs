@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use crate::common::{self, number, run_briefly, run_disturbed, run_short_of_memory};
+use crate::common::{self, number, run_briefly, run_disturbed, run_misused, run_short_of_memory};
 
 const BAD_SCENE: i32 = 65;
 /// Exit code where the machine has not enough memory.
@@ -119,4 +119,37 @@ fn running_out_of_memory_is_told_and_ends_all_ranks() {
     assert!(directory.path().read_dir().unwrap().next().is_none(), "nothing is left behind");
     let end = run_disturbed(1, &["solve", "patch", "--ignore-memory", "--out", out], |_| ());
     assert_eq!(end.code, 0, "{}", end.stderr);
+}
+
+/// A larger scene leaves what every rank holds as it is, but for what is named, and more ranks leave each a smaller share.
+#[test]
+fn what_a_rank_would_hold_is_told_item_by_item_for_any_number_of_ranks() {
+    let held = |ranks: usize, level: &str, of: usize| {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("summary.json");
+        let of = of.to_string();
+        let arguments = ["check", "two-blocks", "--level", level, "--ranks", &of, "--summary", file.to_str().unwrap()];
+        let run = run_briefly(ranks, &arguments);
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        assert!(run.stdout.contains(&format!("MiB on each of {of}")), "{}", run.stdout);
+        let summary: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
+        let rows = summary["memory_of_rank"].as_array().unwrap().clone();
+        assert!(rows.iter().all(|row| run.stdout.contains(row["item"].as_str().unwrap())), "{}", run.stdout);
+        rows
+    };
+    let small = held(1, "1", 64);
+    assert_eq!(small, held(2, "1", 64), "whoever asks");
+    for (few, many) in small.iter().zip(held(1, "1", 128)) {
+        assert!((number(few, "owned_mb") - 2.0 * number(&many, "owned_mb")).abs() < 1e-9, "{few}");
+    }
+    // Level 1 is built, the others are counted.
+    for level in ["2", "100"] {
+        for (small, large) in small.iter().zip(held(1, level, 64)) {
+            let grows = ["coarse problem", "lists of clusters"].iter().any(|name| *name == small["item"]);
+            let stays = small["everywhere_mb"] == large["everywhere_mb"];
+            assert!(stays != grows || small["item"] == "work on a factor", "level {level}: {small} {large}");
+        }
+    }
+    let refused = run_misused(1, &["check", "two-blocks", "--ranks", "0"]);
+    assert_eq!(refused.code, 64, "{}", refused.stderr);
 }

@@ -23,6 +23,7 @@ pub fn grid([n, m]: [usize; 2], first: u64, turned: bool, at: impl Fn(f64, f64) 
         triangles,
         share: 1.0,
         quadratic: Vec::new(),
+        of: None,
     }
 }
 
@@ -139,7 +140,7 @@ fn quadratic(surface: GatheredSurface) -> GatheredSurface {
     let quadratic: Vec<[usize; 6]> = triangles.into_iter().map(face).collect();
     let cut = |&[a, b, c, ab, bc, ca]: &[usize; 6]| [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
     let triangles = quadratic.iter().flat_map(cut).collect();
-    GatheredSurface { parts: vec![0; nodes.len()], nodes, points, triangles, share: 1.0, quadratic }
+    GatheredSurface { parts: vec![0; nodes.len()], nodes, points, triangles, share: 1.0, quadratic, of: None }
 }
 
 /// Nodal forces of a unit pressure, by the faces' own functions.

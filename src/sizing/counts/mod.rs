@@ -15,7 +15,8 @@ mod tests;
 
 use self::parts::Parts;
 use self::structured::Structured;
-use super::memory::{self, Lengths, Memory, SLOT, megabytes};
+use super::held::is_coupled;
+use super::memory::{Held, Lengths, Memory, Numbers, megabytes};
 use crate::decomposition::{BodyMesh, Cut, bricks, tetrahedra};
 use crate::element::Kind;
 use crate::model::discrete::{can_be_cut, cut, groups};
@@ -36,7 +37,8 @@ pub struct Counted<'a> {
 const CUTTING: f64 = 250.0;
 
 /// What is estimated of compact parts.
-const OF_PARTS: [&str; 6] = ["subdomains", "clusters", "contact_subdomains", "primal_dofs", "gluing_rows", "dual_dofs"];
+const OF_PARTS: [&str; 7] =
+    ["subdomains", "clusters", "coarse_blocks", "contact_subdomains", "primal_dofs", "gluing_rows", "dual_dofs"];
 
 impl<'a> Counted<'a> {
     /// Counts the bodies of a scene; `None` if there are meshes from files.
@@ -84,6 +86,7 @@ impl<'a> Counted<'a> {
                 (&mut sizes.elements, counts.elements),
                 (&mut sizes.subdomains, parts.count),
                 (&mut sizes.clusters, parts.clusters),
+                (&mut sizes.coarse_blocks, parts.coarse_blocks),
                 (&mut sizes.contact_subdomains, parts.touching),
                 (&mut sizes.primal_dofs, parts.unknowns),
                 (&mut sizes.gluing_rows, parts.unknowns - 3 * counts.nodes),
@@ -101,24 +104,22 @@ impl<'a> Counted<'a> {
 
     /// What solving takes.
     pub fn memory(&self) -> Memory {
-        let (mut numbers, mut slots, mut subdomains, mut clusters, mut largest) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
+        let (mut numbers, mut subdomains, mut coarse_blocks, mut largest) = (Numbers::default(), 0.0, 0.0, 0.0_f64);
         for parts in self.parts() {
             numbers += parts.numbers;
-            slots += parts.slots;
+            numbers += Numbers::of_slots(parts.slots);
             subdomains += parts.count as f64;
-            clusters += parts.clusters as f64;
+            coarse_blocks += parts.coarse_blocks as f64;
             largest = largest.max(parts.factor);
         }
         let conditions = self.conditions();
         // Of nodes with one copy for the most part, on both sides.
-        slots += self.supported() as f64 + 3.0 * conditions;
+        numbers += Numbers::of_slots(self.supported() as f64 + 3.0 * (conditions[0] + conditions[1]));
         let is_cut_at_once = |body: &&BodyMesh| matches!(self.cut, Cut::Parts(_)) || body.brick().is_none();
         let elements = self.bodies.iter().filter(is_cut_at_once).map(|body| body.counts().elements as f64);
-        Memory {
-            subdomains_mb: megabytes(8.0 * (numbers + SLOT * slots)),
-            rank_mb: memory::of_rank_mb(subdomains, clusters, conditions, largest),
-            cutting_mb: megabytes(CUTTING * elements.sum::<f64>()),
-        }
+        let surfaces = self.scene.contact.values().flat_map(Contact::surfaces).count() as f64;
+        let held = Held { numbers, subdomains, coarse_blocks, conditions, surfaces, largest };
+        Memory { items: held.items(), cutting_mb: megabytes(CUTTING * elements.sum::<f64>()) }
     }
 
     /// Rows of all supports.
@@ -133,10 +134,16 @@ impl<'a> Counted<'a> {
         self.scene.body.keys().zip(&self.shapes).map(on).fold(0, u64::saturating_add)
     }
 
-    /// Most conditions that contacts can have.
-    fn conditions(&self) -> f64 {
-        let slaves = self.scene.contact.values().filter_map(|contact| contact.surfaces().next());
-        slaves.map(|slave| self.nodes_on(slave) as f64).sum()
+    /// Most conditions that contacts can have: of those whose rows are in small blocks, and of the coupled ones.
+    fn conditions(&self) -> [f64; 2] {
+        let mut conditions = [0.0; 2];
+        for contact in self.scene.contact.values() {
+            let is_rigid = contact.surfaces().nth(1).is_none();
+            let meshes_match = is_rigid || contacts::count(self.scene, contact).is_some();
+            let of = usize::from(is_coupled(self.scene, contact, meshes_match));
+            conditions[of] += contact.surfaces().next().map_or(0.0, |slave| self.nodes_on(slave) as f64);
+        }
+        conditions
     }
 
     /// Nodes of a surface.

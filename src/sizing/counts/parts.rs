@@ -3,8 +3,7 @@
 use super::local;
 use crate::decomposition::{BodyMesh, bricks};
 use crate::scene::Scene;
-use crate::sizing::memory;
-use crate::sizing::memory::Lengths;
+use crate::sizing::memory::{Lengths, Numbers};
 
 /// Interface nodes of compact parts to those of boxes.
 const RAGGED: f64 = 1.15;
@@ -18,6 +17,8 @@ pub(super) struct Parts {
     pub count: u64,
     /// Clusters of them.
     pub clusters: u64,
+    /// Their groups on the highest level.
+    pub coarse_blocks: u64,
     /// Those at contact surfaces.
     pub touching: u64,
     /// Displacements of all of them.
@@ -25,7 +26,7 @@ pub(super) struct Parts {
     /// Slots of gluing rows.
     pub slots: f64,
     /// Numbers that they hold while solving.
-    pub numbers: f64,
+    pub numbers: Numbers,
     /// Numbers in the factor of one.
     pub factor: f64,
 }
@@ -41,13 +42,16 @@ impl Parts {
     ) -> Self {
         let along = bricks::along(body, cells);
         let count: u64 = along.iter().map(|&n| n as u64).product();
-        let top = groups.iter().fold(along, |grid, &size| bricks::parts(grid, size));
-        let clusters: u64 = top.iter().map(|&n| n as u64).product();
+        let grouped = |groups: &[usize]| {
+            let grid = groups.iter().fold(along, |grid, &size| bricks::parts(grid, size));
+            grid.iter().map(|&n| n as u64).product()
+        };
+        let (clusters, coarse_blocks) = (grouped(&groups[..groups.len().min(1)]), grouped(groups));
         let of_box: u64 = 3 * cells.iter().map(|&n| (body.kind.degree() * n + 1) as u64).product::<u64>();
         let unknowns = count * of_box;
-        let numbers = count as f64 * memory::of_subdomain(scene, lengths, true);
+        let numbers = Numbers::of_subdomain(scene, lengths, true).times(count as f64);
         let slots = SLOTS * (unknowns - 3 * body.counts().nodes) as f64;
-        Self { count, clusters, touching, unknowns, slots, numbers, factor: lengths.factor }
+        Self { count, clusters, coarse_blocks, touching, unknowns, slots, numbers, factor: lengths.factor }
     }
 
     /// As many parts as are asked for, in groups of so many, of a body with so many nodes along its axes, and on its
@@ -65,14 +69,16 @@ impl Parts {
         let glued = RAGGED * (product([0, 1, 2].map(|a| extent[a] + along[a] - 1.0)) - product(extent));
         let of_piece = (nodes + glued) / count;
         let lengths = local::of_nodes(body.kind, of_piece);
-        let (mut clusters, mut numbers) = (count, count * memory::of_subdomain(scene, lengths, false));
+        let (mut of_levels, mut numbers) = (vec![count], Numbers::of_subdomain(scene, lengths, false).times(count));
         for &size in groups {
-            clusters = (clusters / size as f64).ceil();
-            numbers += clusters * memory::of_group(size as f64);
+            let count = (of_levels[of_levels.len() - 1] / size as f64).ceil();
+            numbers += Numbers::of_group(size as f64).times(count);
+            of_levels.push(count);
         }
         Self {
             count: count.round() as u64,
-            clusters: clusters as u64,
+            clusters: of_levels[groups.len().min(1)] as u64,
+            coarse_blocks: of_levels[groups.len()] as u64,
             touching: (touching / of_piece.powf(2.0 / 3.0)).ceil().min(count.round()) as u64,
             unknowns: 3 * (body.counts().nodes + glued as u64),
             slots: 3.0 * SLOTS * glued,

@@ -43,7 +43,7 @@ impl<'a> Tree<'a> {
         let owned = |rank: usize| ends[rank]..ends[rank + 1];
         let levels = (1..=clusters.levels()).map(|level| Level::new(clusters, level, comm.rank(), &owned, &ends));
         let at_home = (0..comm.size()).map(|rank| clusters.beginning(clusters.levels(), owned(rank)).len());
-        let (levels, clusters) = (levels.collect(), Shares(at_home.collect()));
+        let (levels, clusters) = (levels.collect(), Shares::new(at_home.collect()));
         Self { comm, own: owned(comm.rank()).len(), levels, clusters, ends }
     }
 

@@ -1,0 +1,145 @@
+//! Ranks meet by keys: what one knows and another asks for comes together on the rank that the key points to.
+//!
+//! No rank learns more than it asks for, and none has to know who knows what. Each function is a round or two of all-to-all.
+
+use std::collections::HashMap;
+use std::hash::Hash;
+
+use super::Comm;
+
+/// The rank that a key points to.
+pub fn home(key: &[u64], ranks: usize) -> usize {
+    // Fibonacci hashing of the words one behind the other: keys with a stride are spread, too.
+    let mixed =
+        key.iter().fold(0_u64, |mixed, word| (mixed.rotate_left(29) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    ((u128::from(mixed) * ranks as u128) >> 64) as usize
+}
+
+/// What is known of the wanted keys. Of several who know one the lowest rank counts, and of several reports of a rank the first;
+/// a key that nobody knows has no answer. Collective.
+pub fn look_up<const N: usize>(
+    comm: &dyn Comm,
+    known: impl IntoIterator<Item = ([u64; N], Vec<u64>)>,
+    wanted: impl IntoIterator<Item = [u64; N]>,
+) -> HashMap<[u64; N], Vec<u64>> {
+    let ranks = comm.size();
+    let mut outgoing = vec![Vec::new(); ranks];
+    for (key, value) in known {
+        let message = &mut outgoing[home(&key, ranks)];
+        message.extend(key);
+        message.push(value.len() as u64);
+        message.extend(value);
+    }
+    let mut directory: HashMap<[u64; N], Vec<u64>> = HashMap::new();
+    for report in comm.all_to_all(outgoing) {
+        each_packed(&report, |key, value| {
+            directory.entry(key).or_insert_with(|| value.to_vec());
+        });
+    }
+    let mut wishes = vec![Vec::new(); ranks];
+    wanted.into_iter().for_each(|key| wishes[home(&key, ranks)].extend(key));
+    let answer = |wish: Vec<u64>| {
+        let mut message = Vec::new();
+        for key in wish.as_chunks::<N>().0 {
+            if let Some(value) = directory.get(key) {
+                message.extend(key);
+                message.push(value.len() as u64);
+                message.extend(value);
+            }
+        }
+        message
+    };
+    let answers = comm.all_to_all(wishes).into_iter().map(answer).collect();
+    let mut found = HashMap::new();
+    for answer in comm.all_to_all(answers) {
+        each_packed(&answer, |key, value| {
+            found.insert(key, value.to_vec());
+        });
+    }
+    found
+}
+
+/// How often all ranks together name each of this rank's keys. Collective.
+pub fn count<const N: usize>(comm: &dyn Comm, mine: &[[u64; N]]) -> HashMap<[u64; N], u64> {
+    let ranks = comm.size();
+    // Each rank names a key once, with its count.
+    let own = tally(mine.iter().map(|key| (*key, 1)));
+    let mut keys = vec![Vec::new(); ranks];
+    let mut outgoing = vec![Vec::new(); ranks];
+    for (key, count) in &own {
+        let home = home(key, ranks);
+        keys[home].push(*key);
+        outgoing[home].extend(key);
+        outgoing[home].push(*count);
+    }
+    let reports: Vec<Vec<([u64; N], u64)>> = comm
+        .all_to_all(outgoing)
+        .iter()
+        .map(|report| report.chunks_exact(N + 1).map(|r| (std::array::from_fn(|k| r[k]), r[N])).collect())
+        .collect();
+    let all = tally(reports.iter().flatten().copied());
+    let answers = reports.iter().map(|report| report.iter().map(|(key, _)| all[key]).collect()).collect();
+    keys.into_iter().zip(comm.all_to_all(answers)).flat_map(|(keys, counts)| keys.into_iter().zip(counts)).collect()
+}
+
+fn tally<K: Hash + Eq>(counts: impl Iterator<Item = (K, u64)>) -> HashMap<K, u64> {
+    let mut sums = HashMap::new();
+    counts.for_each(|(key, count)| *sums.entry(key).or_default() += count);
+    sums
+}
+
+/// Goes through keys with their values, packed one behind the other.
+fn each_packed<const N: usize>(message: &[u64], mut tell: impl FnMut([u64; N], &[u64])) {
+    let mut rest = message;
+    while let Some((key, behind)) = rest.split_first_chunk::<N>() {
+        let (count, behind) = behind.split_first().expect("messages are whole");
+        let (value, behind) = behind.split_at(*count as usize);
+        tell(*key, value);
+        rest = behind;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+
+    #[test]
+    fn the_lowest_rank_that_knows_a_key_answers() {
+        for ranks in [1, 2, 5] {
+            threads::run(ranks, |comm| {
+                let rank = comm.rank() as u64;
+                // Rank r knows the keys up to r, as r + 1 numbers: the lowest that knows one is of its number.
+                let known = (0..=rank).map(|key| ([key, 7], vec![rank; rank as usize + 1]));
+                let last = ranks as u64 - 1;
+                let found = look_up(comm, known, [[last, 7], [0, 7], [9, 7]]);
+                assert_eq!(found[&[last, 7]], vec![last; ranks]);
+                assert_eq!(found[&[0, 7]], [0]);
+                assert!(!found.contains_key(&[9, 7]));
+            });
+        }
+    }
+
+    #[test]
+    fn every_key_is_counted_over_all_ranks() {
+        for ranks in [1, 3, 4] {
+            threads::run(ranks, |comm| {
+                let mine: Vec<[u64; 1]> = (0..=comm.rank() as u64).flat_map(|key| [[key], [key]]).collect();
+                let found = count(comm, &mine);
+                for key in 0..=comm.rank() as u64 {
+                    assert_eq!(found[&[key]], 2 * (ranks as u64 - key));
+                }
+                assert_eq!(found.len(), comm.rank() + 1);
+            });
+        }
+    }
+
+    #[test]
+    fn keys_with_a_stride_are_spread_over_the_ranks() {
+        for stride in [1, 64, 4096] {
+            let mut loads = [0; 16];
+            (0..1600).for_each(|k| loads[home(&[stride * k], 16)] += 1);
+            assert!(loads.iter().all(|load| (40..200).contains(load)), "{stride}: {loads:?}");
+        }
+    }
+}
