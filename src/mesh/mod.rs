@@ -3,28 +3,36 @@
 //! [`brick`] numbers and places a structured body without storing it, [`face`] names its six faces; [`mapped`] bodies are
 //! structured too, but curved or of unequal cells, and stored. [`gmsh`] reads files
 //! into a [`solid`] mesh, with cells [`split`] into tetrahedra where these are wanted, and put in [`placement`].
-//! [`elements`] are known by their nodes; [`faces`] tells which are neighbours, [`surface`] integrates over boundary
+//! Of stored meshes each rank has a [`portion`] along a [`curve`], in as many pieces as there are ranks, or parts of [`wholes`].
+//! [`elements`] are known by their nodes; [`faces`] tells which are neighbours, [`joints`] also beyond the rank, [`marked`]
+//! brings names to faces. [`surface`] integrates over boundary
 //! faces, [`quality`] counts elements that no computation could use, [`whole`] finds what only looks joined ([`boxes`] of
 //! what is [`near`]) and the pieces of a mesh by their [`connectivity`]. No displacements, no material.
 
 pub mod boxes;
 pub mod brick;
 pub mod connectivity;
+pub mod curve;
 pub mod elements;
 pub mod face;
 pub mod faces;
 pub mod gmsh;
+pub mod joints;
 pub mod mapped;
+pub mod marked;
 pub mod near;
 pub mod placement;
+pub mod portion;
 pub mod quality;
 pub mod solid;
 pub mod split;
 pub mod surface;
 pub mod whole;
+pub mod wholes;
 
 pub use brick::{Block, Brick};
 pub use elements::Elements;
 pub use face::Face;
 pub use mapped::Mapped;
+pub use portion::Portion;
 pub use solid::SolidMesh;

@@ -25,21 +25,19 @@ pub struct Memory {
     pub subdomains_mb: f64,
     /// On every rank.
     pub rank_mb: f64,
-    /// On rank 0 while meshes are cut, before anything else is there.
+    /// On each rank, at most, while meshes are read and cut, before anything else is there.
     pub cutting_mb: f64,
 }
 
 impl Memory {
     /// Of all ranks together.
     pub fn total_mb(&self, ranks: usize) -> f64 {
-        let cutting = self.cutting_mb + PROCESS_MB * ranks as f64;
-        (self.subdomains_mb + self.rank_mb * ranks as f64).max(cutting)
+        (self.subdomains_mb + self.rank_mb * ranks as f64).max((self.cutting_mb + PROCESS_MB) * ranks as f64)
     }
 
     /// Of a rank with its part of the subdomains.
-    pub fn of_rank_mb(&self, rank: usize, ranks: usize) -> f64 {
-        let solving = self.subdomains_mb / ranks as f64 + self.rank_mb;
-        if rank == 0 { solving.max(self.cutting_mb + PROCESS_MB) } else { solving }
+    pub fn of_rank_mb(&self, ranks: usize) -> f64 {
+        (self.subdomains_mb / ranks as f64 + self.rank_mb).max(self.cutting_mb + PROCESS_MB)
     }
 }
 

@@ -9,12 +9,10 @@
 //! nor in what order. Nothing is known of the body's boundary: a part may reach across a gap, and what it has there is
 //! another's to take ([`super::pieces`]).
 
-use super::sum;
-use super::wholes::Wholes;
-use crate::comm::{Comm, maximum};
+use crate::comm::Comm;
+use crate::comm::words::sum;
+use crate::mesh::wholes::Wholes;
 
-/// Cells of the grid along the body's longest side.
-const GRID: f64 = (1 << 24) as f64;
 /// Parts that an element may move to: the nearest ones of its own, with itself.
 const NEAREST: usize = 24;
 /// How often centres move with a sample of the elements, and with all of them.
@@ -87,22 +85,6 @@ struct Cell {
     /// Mean square of distances from the centre, the last that was not zero.
     spread: f64,
     weight: f64,
-}
-
-/// Points in cells of a grid over those of all ranks. Collective.
-pub fn on_grid(comm: &dyn Comm, points: &[[f64; 3]]) -> Vec<[i32; 3]> {
-    let mut extremes = vec![f64::NEG_INFINITY; 6];
-    for (point, axis) in points.iter().flat_map(|point| (0..3).map(move |axis| (point, axis))) {
-        extremes[axis] = extremes[axis].max(point[axis]);
-        extremes[3 + axis] = extremes[3 + axis].max(-point[axis]);
-    }
-    let extremes = maximum(comm, &extremes);
-    let longest = (0..3).map(|axis| extremes[axis] + extremes[3 + axis]).fold(f64::MIN_POSITIVE, f64::max);
-    let last = GRID as i32 - 1;
-    let place = |point: &[f64; 3]| {
-        std::array::from_fn(|axis| (((point[axis] + extremes[3 + axis]) / longest * GRID) as i32).min(last))
-    };
-    points.iter().map(place).collect()
 }
 
 /// Words a part of [`move_centres`].
@@ -192,6 +174,7 @@ mod tests {
     use super::*;
     use crate::comm::solo::Solo;
     use crate::comm::threads;
+    use crate::mesh::curve::on_grid;
     use crate::random::Random;
 
     /// Points in a cube, four times as dense at one end.
