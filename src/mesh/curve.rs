@@ -36,7 +36,7 @@ pub fn start(comm: &dyn Comm, points: &[[i32; 3]], of_elements: &[u32], wholes: 
     sorted.sort_unstable();
     let count = |key: (u32, u64)| sorted.partition_point(|other| *other <= key) as u64;
     let first = |whole: u32| sorted.partition_point(|key| key.0 < whole) as u64;
-    let before: Vec<u64> = (0..wholes.len() as u32).map(first).collect();
+    let before: Vec<u64> = (0..wholes.count() as u32).map(first).collect();
     // For each part the last place that is in it: the first one up to which there are enough elements.
     let mut ends = vec![[0_u64, (1 << (3 * BITS)) - 1]; wholes.parts()];
     for _ in 0..3 * BITS {

@@ -54,12 +54,12 @@ mod tests {
         for ranks in [1, 3] {
             let found = threads::run(ranks, |comm| {
                 let rank = comm.rank() as u32;
-                let nodes: Vec<u32> = (0..20).filter(|node| node % (rank + 1) == 0).collect();
+                let nodes: Vec<u32> = (0..20_u32).filter(|node| node.is_multiple_of(rank + 1)).collect();
                 let faces = [(vec![4, 7, 9], 5), (vec![4, 7, 9], 5), (vec![6 + rank, 18, 19], 2)];
                 forward(comm, &nodes, 3, &faces)
             });
             for (rank, marked) in (0..).zip(found) {
-                let has = |node: u32| node % (rank + 1) == 0;
+                let has = |node: u32| node.is_multiple_of(rank + 1);
                 let mut expected = Marked::new();
                 expected.extend(has(4).then(|| (vec![4, 7, 9], vec![5])));
                 expected.extend((6..6 + ranks as u32).filter(|&k| has(k)).map(|k| (vec![k, 18, 19], vec![2])));

@@ -31,7 +31,7 @@ pub fn compact(comm: &dyn Comm, points: &[[i32; 3]], part: &mut [u32], wholes: &
     let mut cells = vec![Cell::default(); wholes.parts()];
     move_centres(comm, &mut cells, points, part);
     cells.iter_mut().for_each(|cell| cell.weight = cell.spread);
-    let all: u64 = (0..wholes.len() as u32).map(|whole| wholes.size(whole)).sum();
+    let all: u64 = (0..wholes.count() as u32).map(|whole| wholes.size(whole)).sum();
     let stride = (all / (SAMPLE * wholes.parts() as u64)).max(1);
     let sample: Vec<usize> = (0..points.len()).filter(|&at| scattered(points[at]).is_multiple_of(stride)).collect();
     let of_sample: Vec<[i32; 3]> = sample.iter().map(|&at| points[at]).collect();
@@ -57,7 +57,7 @@ fn scattered(point: [i32; 3]) -> u64 {
 fn round(comm: &dyn Comm, (cells, near): (&mut [Cell], &Near), points: &[[i32; 3]], part: &mut [u32], wholes: &Wholes) {
     for _ in 0..ADAPTIONS {
         let sizes = sum(comm, assign(cells, near, points, part));
-        let mut of_wholes = vec![0; wholes.len()];
+        let mut of_wholes = vec![0; wholes.count()];
         (0..).zip(&sizes).for_each(|(part, size)| of_wholes[wholes.of_part(part) as usize] += size);
         let off = |(part, size): (u32, &u64)| {
             let whole = wholes.of_part(part);

@@ -161,7 +161,7 @@ impl Cut {
         portion.part = curve::start(comm, &start(&portion), &portion.wholes, &wholes);
         portion = portion.sent(comm, |at| rank(portion.part[at]));
         let (ground, sides) = (Ground::new(comm, &portion), Sides::new(comm, &portion));
-        let is_cut = wholes.parts() > wholes.len();
+        let is_cut = wholes.parts() > wholes.count();
         for (is_compact, is_smooth) in [(true, true), (false, true), (false, false)] {
             if is_smooth && !is_cut {
                 continue;

@@ -317,7 +317,8 @@ impl Problem {
 
     /// Something else than the format prescribes, shown by its beginning.
     pub(super) fn expected(place: Place, expected: &'static str, found: &[u8]) -> Self {
-        let found = String::from_utf8_lossy(&found[..found.len().min(64)]).into_owned();
+        // Texts between ranks end where a NUL is.
+        let found = String::from_utf8_lossy(&found[..found.len().min(64)]).replace('\0', "\u{fffd}");
         Self::Expected { place, expected, found }
     }
 }

@@ -61,7 +61,7 @@ fn files_read_in_parts_are_those_read_whole_on_any_ranks() {
         // Two volumes touch, but have no nodes in common.
         for volumes in [&volumes[..1], &volumes[..]].into_iter().filter(|v| v.len() != 2) {
             let expected = plain(&[whole.body(&Solo, volumes, &surface, Element::Tet4).unwrap()]);
-            for ranks in [1, 2, 3, 5, 200] {
+            for ranks in [1, 2, 3, 5] {
                 for large in [0, u64::MAX] {
                     assert!(read(&path, ranks, large, volumes, &surface) == expected, "{ranks} ranks, {volumes:?}");
                 }
@@ -70,8 +70,12 @@ fn files_read_in_parts_are_those_read_whole_on_any_ranks() {
     }
 }
 
+/// A node with its number, and a tetrahedron by such.
+type Node = (u64, [f64; 3]);
+type Tet = [u64; 4];
+
 /// A binary file of these nodes, with their numbers, and a block of tetrahedra by numbers.
-fn binary(nodes: &[(u64, [f64; 3])], cells: &[[u64; 4]]) -> Vec<u8> {
+fn binary(nodes: &[Node], cells: &[Tet]) -> Vec<u8> {
     let mut bytes = b"$MeshFormat\n4.1 1 8\n".to_vec();
     let ints = |bytes: &mut Vec<u8>, ints: &[i32]| ints.iter().for_each(|n| bytes.extend(n.to_ne_bytes()));
     let sizes = |bytes: &mut Vec<u8>, sizes: &[u64]| sizes.iter().for_each(|n| bytes.extend(n.to_ne_bytes()));
@@ -123,15 +127,15 @@ fn numbers_of_nodes_may_be_any_and_what_is_wrong_has_the_same_message() {
     // Tetrahedra around an axis, with gaps between the numbers of their nodes, which are in no order.
     let number = |k: u64| (k * 7919) % 1009 + (k % 2) * (1 << 40);
     let point = |k: u64| if k < 2 { [0.0, 0.0, k as f64] } else { [(k as f64).cos(), (k as f64).sin(), 0.5] };
-    let nodes: Vec<(u64, [f64; 3])> = (0..8).map(|k| (number(k), point(k))).collect();
-    let cells: Vec<[u64; 4]> = (2..7).map(|k| [0, k, k + 1, 1].map(number)).collect();
-    let same = |nodes: &[(u64, [f64; 3])], cells: &[[u64; 4]]| {
+    let nodes: Vec<Node> = (0..8).map(|k| (number(k), point(k))).collect();
+    let cells: Vec<Tet> = (2..7).map(|k| [0, k, k + 1, 1].map(number)).collect();
+    let same = |nodes: &[Node], cells: &[Tet]| {
         let [whole, parts] = both(&path, &binary(nodes, cells));
         assert_eq!(whole, parts);
         whole
     };
     assert_eq!(same(&nodes, &cells).unwrap().0.len(), 5);
-    let refused = |change: &dyn Fn(&mut Vec<(u64, [f64; 3])>, &mut Vec<[u64; 4]>), part: &str| {
+    let refused = |change: &dyn Fn(&mut Vec<Node>, &mut Vec<Tet>), part: &str| {
         let (mut nodes, mut cells) = (nodes.clone(), cells.clone());
         change(&mut nodes, &mut cells);
         let text = same(&nodes, &cells).expect_err("something is wrong");
@@ -144,8 +148,8 @@ fn numbers_of_nodes_may_be_any_and_what_is_wrong_has_the_same_message() {
     refused(&|_, cells| cells[1].swap(0, 1), "1 of 5 elements are inverted");
     refused(&|_, cells| cells[3][2] = cells[3][1], "1 cells have a node twice");
     refused(&|nodes, cells| cells.iter_mut().for_each(|cell| cell[0] = nodes[0].0 + 1), "which is not in");
-    // A cell that is left out leaves two pieces that hang together by the axis.
-    refused(&|_, cells| drop((cells.remove(1), cells.remove(2))), "nodes alone join parts");
+    // Cells that are left out leave pieces that hang together by the axis.
+    refused(&|_, cells| cells.retain(|cell| ![3, 5].map(number).contains(&cell[1])), "nodes alone join parts");
 }
 
 #[test]
