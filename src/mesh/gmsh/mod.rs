@@ -2,8 +2,8 @@
 //! format").
 //!
 //! [`Msh`] is what a file says about volumes and surfaces, and a rank's share in their nodes and cells; [`volume`] takes one
-//! body out of it. Of large binary files of version 4.1 each rank reads its own bytes ([`ranges`]); others rank 0 reads, and
-//! deals them out ([`deal`]). Points, lines, node data,
+//! body out of it. Of large binary files of version 4.1 each rank reads its own bytes (`ranges`); others rank 0 reads, and
+//! deals them out (`deal`). Points, lines, node data,
 //! periodicity and parametric coordinates are read over. Files come from users, so nothing in them is trusted: memory
 //! follows what is there, not what is announced.
 
