@@ -264,8 +264,8 @@ fn names(body: &str, SolidMesh { portion, pieces, piece_count, .. }: &SolidMesh,
     }
     let mut rooms: BTreeMap<u64, Box3> = BTreeMap::new();
     for (element, &piece) in pieces.iter().enumerate() {
-        let room = rooms.entry(piece.into()).or_insert([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]);
-        *room = around(room.iter().chain(&portion.places(element)));
+        let its = around(&portion.places(element));
+        rooms.entry(piece.into()).and_modify(|room| *room = around(room.iter().chain(&its))).or_insert(its);
     }
     let words = |(piece, room): (&u64, &Box3)| {
         std::iter::once(*piece).chain(room.as_flattened().iter().map(|x| x.to_bits())).collect::<Vec<_>>()
