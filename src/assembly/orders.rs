@@ -2,7 +2,6 @@
 //! all around, under the body force that it takes. Errors are integrated by 27 points an element, which the elements do not
 //! know.
 
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use super::{Region, stiffness};
@@ -44,7 +43,7 @@ pub fn body_force(x: [f64; 3]) -> [f64; 3] {
 pub fn cube(kind: Kind, cells: usize) -> Subdomain {
     let brick = Brick { origin: [0.0; 3], size: [1.0; 3], cells: [cells; 3] };
     let bodies = number_bodies([(kind, Shape::Brick(brick), vec![0])]);
-    let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
+    let torn = Bodies { bodies: &bodies, surfaces: &[] };
     let elements: Vec<u64> = (0..bodies[0].counts().elements).collect();
     Subdomain::of_brick(0, &torn, 0, &elements)
 }

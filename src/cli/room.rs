@@ -33,12 +33,12 @@ impl Room {
         let mine = available_mb().map_or_else(String::new, |left| format!("{left} {}", host()));
         // Ranks, needed, available.
         let mut hosts: BTreeMap<String, (usize, f64, f64)> = BTreeMap::new();
-        for (rank, text) in all_gather_text(comm, &mine).into_iter().enumerate() {
+        for text in all_gather_text(comm, &mine) {
             let Some((left, host)) = text.split_once(' ') else { continue };
             let left: f64 = left.parse().unwrap_or(f64::INFINITY);
             let (ranks, needed, available) = hosts.entry(host.to_owned()).or_insert((0, 0.0, left));
             *ranks += 1;
-            *needed += memory.of_rank_mb(rank, comm.size());
+            *needed += memory.of_rank_mb(comm.size());
             *available = available.min(left);
         }
         let everywhere_mb = hosts.values().map(|(.., available)| available).sum();

@@ -9,12 +9,14 @@
 //! It does not know subdomains beyond that: ranks own consecutive blocks of them, so rank order is subdomain order.
 
 pub mod agree;
+pub mod common;
 pub mod exact;
 pub mod meeting;
 pub mod solo;
 pub mod threads;
 #[cfg(test)]
 pub mod watched;
+pub mod words;
 pub mod world;
 
 /// Collective and neighbour communication of one rank. All methods but [`Comm::rank`] and [`Comm::size`] are

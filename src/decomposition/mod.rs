@@ -15,6 +15,7 @@ pub mod subdomain;
 pub mod sums;
 pub mod twins;
 
+pub use crate::mesh::solid::Counts;
 pub use clusters::Clusters;
 pub use interface::InterfaceNode;
 pub use subdomain::Subdomain;
@@ -61,19 +62,8 @@ pub struct BodyMesh {
 pub enum Shape {
     /// Any rank can generate them.
     Brick(Brick),
-    /// Rank 0 has them, as a [`SolidMesh`], until they are torn; the others know how many there are.
+    /// Each rank has some, as a [`SolidMesh`], until they are torn; all know how many there are.
     Mesh(Counts),
-}
-
-/// Sizes of a mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Counts {
-    /// Nodes.
-    pub nodes: u64,
-    /// Cells before they were split into elements.
-    pub cells: u64,
-    /// Elements.
-    pub elements: u64,
 }
 
 impl BodyMesh {
@@ -146,8 +136,6 @@ impl BodyMesh {
 pub struct Bodies<'a> {
     /// In the order of their names.
     pub bodies: &'a [BodyMesh],
-    /// On rank 0 the meshes of bodies that are no bricks, by index; empty elsewhere.
-    pub meshes: &'a BTreeMap<usize, SolidMesh>,
     /// Named surfaces; facets and interface nodes refer to them by index.
     pub surfaces: &'a [Surface],
 }
@@ -194,11 +182,13 @@ pub fn number_bodies(shapes: impl IntoIterator<Item = (Kind, Shape, Vec<usize>)>
         .collect()
 }
 
-/// Tears the bodies into subdomains, in groups of about so many on each level, which `groups` tells of the number of
-/// subdomains. `yielding` says which boxes of [`Cut::Bricks`] of each body, x fastest, are expected to yield: every rank gets its part of
+/// Tears the bodies into subdomains, `meshes` being this rank's parts of those that are no bricks, by index, in groups of about so
+/// many on each level, which `groups` tells of the number of subdomains.
+/// `yielding` says which boxes of [`Cut::Bricks`] of each body, x fastest, are expected to yield: every rank gets its part of
 /// them. Collective.
 pub fn tear(
     bodies: &Bodies,
+    meshes: BTreeMap<usize, SolidMesh>,
     cut: Cut,
     groups: &dyn Fn(usize) -> Vec<usize>,
     yielding: Option<&[Vec<bool>]>,
@@ -212,7 +202,7 @@ pub fn tear(
             let of_brick = |(id, (body, list)): (usize, ElementList)| Subdomain::of_brick(id, bodies, body, &list);
             (clusters, shares, ids.zip(lists).map(of_brick).collect())
         }
-        Cut::Parts(parts) => parts::own_subdomains(bodies, parts, &groups(parts), comm),
+        Cut::Parts(parts) => parts::own_subdomains(bodies, meshes, parts, &groups(parts), comm),
     };
     let interface = interface::share(comm, &subdomains);
     Decomposition { shares, clusters, subdomains, interface }

@@ -1,11 +1,10 @@
 //! One subdomain's mesh in local numbering.
 
-use std::collections::HashMap;
-
 use super::{Bodies, BodyMesh, Patch, Surface};
 use crate::element::Kind;
 use crate::mesh::Elements;
 use crate::mesh::faces::{Neighbours, key};
+use crate::mesh::marked::Marked;
 use crate::vector::difference;
 
 /// A face on a named surface.
@@ -105,7 +104,7 @@ impl Subdomain {
         &BodyMesh { first_node, ref materials, kind, .. }: &BodyMesh,
         nodes: &[u64],
         point: impl Fn(u64) -> [f64; 3],
-        surfaces: &HashMap<Vec<u32>, Vec<usize>>,
+        surfaces: &Marked,
     ) -> Self {
         let surfaces = |face: &[u64]| {
             let face: Vec<u32> = face.iter().map(|&n| n as u32).collect();
@@ -124,15 +123,4 @@ impl Subdomain {
     pub fn local_node(&self, node: u64) -> Option<usize> {
         self.nodes.binary_search(&node).ok()
     }
-}
-
-/// Two numbers a word.
-pub(super) fn pack_pairs(numbers: &[u32], message: &mut Vec<u64>) {
-    let pair = |pair: &[u32]| u64::from(pair.get(1).copied().unwrap_or_default()) << 32 | u64::from(pair[0]);
-    message.extend(numbers.chunks(2).map(pair));
-}
-
-pub(super) fn unpack_pairs(count: usize, next: &mut impl FnMut() -> u64) -> Vec<u32> {
-    let words = (0..count.div_ceil(2)).map(|_| next());
-    words.flat_map(|pair| [pair as u32, (pair >> 32) as u32]).take(count).collect()
 }

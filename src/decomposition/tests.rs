@@ -3,14 +3,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::subdomain::Facet;
 use super::{Bodies, BodyMesh, Counts, Cut, Patch, Shape, Subdomain, number_bodies, tear};
 use crate::comm::solo::Solo;
-use crate::comm::threads;
+use crate::comm::words::share;
+use crate::comm::{Comm, threads};
 use crate::element::tet4::Tet4;
 use crate::element::{Element, Kind};
 use crate::fixture::{RANKS, Setup, built_in, on_ranks, two_bricks, two_bricks_by_metis, two_meshes};
 use crate::mesh::brick::indices;
 use crate::mesh::faces::key;
 use crate::mesh::surface::area_vector;
-use crate::mesh::{Brick, Elements, SolidMesh};
+use crate::mesh::{Brick, Elements, Portion, SolidMesh};
 use crate::model::discrete::discretise;
 use crate::scene::Scene;
 use crate::sizing::sizes;
@@ -195,28 +196,33 @@ fn mesh_of(bricks: &[Brick]) -> SolidMesh {
         let tets = indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell)).flatten();
         nodes.extend(tets.map(|n| first + n as u32));
     }
-    SolidMesh {
-        points,
-        elements: Elements::new(Kind::Tet4, nodes),
-        cells: 0,
-        surfaces: Vec::new(),
-        regions: Vec::new(),
-        pieces: Vec::new(),
-    }
+    let portion = Portion::new(Kind::Tet4, 0, &nodes, |node| points[node as usize]);
+    let counts = Counts { nodes: points.len() as u64, cells: 0, elements: portion.len() as u64 };
+    SolidMesh { pieces: vec![0; portion.len()], portion, surfaces: Vec::new(), piece_count: 1, counts }
+}
+
+/// A rank's share of a mesh that all of them have.
+fn of_rank(comm: &dyn Comm, mesh: &SolidMesh) -> SolidMesh {
+    let Portion { elements, wholes, points, .. } = &mesh.portion;
+    let own = share(elements.len() as u64, comm);
+    let places = own.start as usize..own.end as usize;
+    let nodes: Vec<u32> = places.clone().flat_map(|at| elements.get(at)).copied().collect();
+    let portion = Portion::new(elements.kind(), own.start as u32, &nodes, |node| points[node as usize]);
+    let portion = Portion { wholes: wholes[places.clone()].to_vec(), ..portion };
+    SolidMesh { portion, pieces: mesh.pieces[places].to_vec(), ..mesh.clone() }
 }
 
 #[test]
 fn a_body_of_several_pieces_is_cut_piece_by_piece() {
     let brick = |x: f64, cells| Brick { origin: [x, 0.0, 0.0], size: [1.0; 3], cells };
     let mut mesh = mesh_of(&[brick(0.0, [4, 4, 4]), brick(2.0, [1, 1, 1]), brick(4.0, [4, 4, 2])]);
-    let elements = mesh.elements.len();
-    mesh.pieces = [vec![0; 384], vec![1; 6], vec![2; 192]].concat();
-    let counts = Counts { nodes: mesh.points.len() as u64, cells: 0, elements: elements as u64 };
-    let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(counts), vec![0])]);
+    let elements = mesh.portion.len();
+    (mesh.pieces, mesh.piece_count) = ([vec![0; 384], vec![1; 6], vec![2; 192]].concat(), 3);
+    let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(mesh.counts), vec![0])]);
     let meshes = BTreeMap::from([(0, mesh)]);
     for parts in [1, 3, 12] {
-        let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[] };
-        let subdomains = tear(&torn, Cut::Parts(parts), &|_| Vec::new(), None, &Solo).subdomains;
+        let torn = Bodies { bodies: &bodies, surfaces: &[] };
+        let subdomains = tear(&torn, meshes.clone(), Cut::Parts(parts), &|_| Vec::new(), None, &Solo).subdomains;
         assert!(subdomains.len() >= parts.max(3));
         assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
         subdomains.iter().for_each(assert_hangs_together);
@@ -230,8 +236,8 @@ fn thin_plates_and_bodies_of_few_elements_are_cut() {
     {
         let brick = Brick { origin: [0.0; 3], size, cells };
         let bodies = number_bodies([(Kind::Tet4, Shape::Brick(brick), vec![0])]);
-        let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
-        let subdomains = tear(&torn, Cut::Parts(parts), &|_| Vec::new(), None, &Solo).subdomains;
+        let torn = Bodies { bodies: &bodies, surfaces: &[] };
+        let subdomains = tear(&torn, BTreeMap::new(), Cut::Parts(parts), &|_| Vec::new(), None, &Solo).subdomains;
         subdomains.iter().for_each(assert_hangs_together);
         let elements = brick.element_count() as usize;
         assert_eq!(subdomains.iter().map(|s| s.elements.len()).sum::<usize>(), elements);
@@ -245,18 +251,16 @@ fn regions_are_cut_one_by_one_by_their_size() {
     let mut mesh = mesh_of(&[Brick { origin: [0.0; 3], size: [1.0; 3], cells: [8, 4, 4] }]);
     // A quarter of the body between two parts of the rest.
     let region = |nodes: &[u32]| {
-        let x = nodes.iter().map(|&n| mesh.points[n as usize][0]).sum::<f64>() / 4.0;
+        let x = nodes.iter().map(|&n| mesh.portion.points[n as usize][0]).sum::<f64>() / 4.0;
         u32::from((0.25..0.5).contains(&x))
     };
-    mesh.regions = mesh.elements.iter().map(region).collect();
-    let counts = Counts { nodes: mesh.points.len() as u64, cells: 0, elements: mesh.elements.len() as u64 };
-    let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(counts), vec![2, 5])]);
-    let meshes = BTreeMap::from([(0, mesh)]);
+    mesh.portion.wholes = mesh.portion.elements.iter().map(region).collect();
+    let bodies = number_bodies([(Kind::Tet4, Shape::Mesh(mesh.counts), vec![2, 5])]);
     let cut = |parts: usize, ranks: usize| {
         let subdomains = threads::run(ranks, |comm| {
-            let meshes = if comm.rank() == 0 { meshes.clone() } else { BTreeMap::new() };
-            let torn = Bodies { bodies: &bodies, meshes: &meshes, surfaces: &[] };
-            tear(&torn, Cut::Parts(parts), &|_| Vec::new(), None, comm).subdomains
+            let torn = Bodies { bodies: &bodies, surfaces: &[] };
+            let meshes = BTreeMap::from([(0, of_rank(comm, &mesh))]);
+            tear(&torn, meshes, Cut::Parts(parts), &|_| Vec::new(), None, comm).subdomains
         });
         subdomains.concat()
     };
@@ -289,8 +293,9 @@ fn boxes_that_yield_are_spread_over_the_ranks() {
     let yielding = [upper, corner];
     let cut = |expected: Option<&[Vec<bool>]>, ranks: usize| {
         threads::run(ranks, |comm| {
-            let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
-            let own = tear(&torn, Cut::Bricks([2, 2, 2]), &|_| Vec::new(), expected, comm).subdomains;
+            let torn = Bodies { bodies: &bodies, surfaces: &[] };
+            let none = &|_| Vec::new();
+            let own = tear(&torn, BTreeMap::new(), Cut::Bricks([2, 2, 2]), none, expected, comm).subdomains;
             own.iter().map(|s| (s.body, s.nodes.clone())).collect::<Vec<_>>()
         })
     };

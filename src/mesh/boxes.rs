@@ -37,6 +37,20 @@ impl<'a> BoxTree<'a> {
         Self { boxes, order, nodes }
     }
 
+    /// Up to eight boxes around all of them.
+    pub fn hulls(&self) -> Vec<Box3> {
+        let (mut hulls, mut open) = (Vec::new(), Vec::new());
+        open.extend((!self.nodes.is_empty()).then_some((0, 3)));
+        while let Some((at, depth)) = open.pop() {
+            let node: &Node = &self.nodes[at as usize];
+            match (node.right, depth) {
+                (0, _) | (_, 0) => hulls.push(node.hull),
+                (right, _) => open.extend([(at + 1, depth - 1), (right, depth - 1)]),
+            }
+        }
+        hulls
+    }
+
     /// Gives the number of every box that has a point in common with this one.
     pub fn meeting(&self, asked: &Box3, mut give: impl FnMut(u32)) {
         let mut open = Vec::with_capacity(64);
@@ -84,7 +98,8 @@ impl<'a> BoxTree<'a> {
     }
 }
 
-fn meet([a_low, a_high]: &Box3, [b_low, b_high]: &Box3) -> bool {
+/// Whether two boxes have a point in common.
+pub fn meet([a_low, a_high]: &Box3, [b_low, b_high]: &Box3) -> bool {
     (0..3).all(|i| a_low[i] <= b_high[i] && b_low[i] <= a_high[i])
 }
 

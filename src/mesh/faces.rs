@@ -14,10 +14,9 @@ pub struct Neighbours {
     faces: usize,
     /// Element by element, for each face the element behind, or [`OUTSIDE`].
     behind: Vec<u32>,
-    /// Faces with more than two elements, or two on the same side: the mesh overlaps itself. Nobody is behind them.
-    pub overlapping: u64,
-    /// A node of the first of them.
-    pub overlaps_at: Option<u32>,
+    /// Faces with more than two elements, or two on the same side, each by one of its numbers: the mesh overlaps itself.
+    /// Nobody is behind them. The number of a face is that of its element, times the faces of an element, and its own.
+    pub overlapping: Vec<u32>,
 }
 
 impl Neighbours {
@@ -51,7 +50,7 @@ impl Neighbours {
             *next += 1;
         }
 
-        let mut neighbours = Self { faces, behind: vec![OUTSIDE; sorted.len()], overlapping: 0, overlaps_at: None };
+        let mut neighbours = Self { faces, behind: vec![OUTSIDE; sorted.len()], overlapping: Vec::new() };
         let mut bucket = Vec::new();
         for range in begin.windows(2) {
             bucket.clear();
@@ -69,10 +68,7 @@ impl Neighbours {
                         neighbours.behind[a as usize] = b / faces as u32;
                         neighbours.behind[b as usize] = a / faces as u32;
                     }
-                    _ => {
-                        neighbours.overlapping += 1;
-                        neighbours.overlaps_at.get_or_insert(same[0].0[0]);
-                    }
+                    _ => neighbours.overlapping.push(same[0].1),
                 }
             }
         }
@@ -113,9 +109,10 @@ pub fn key(face: &[u32]) -> Vec<u32> {
 }
 
 /// Which way a face turns: the same for every first corner, opposite on its other side.
-fn turns<const C: usize>(corners: &[u32; C]) -> bool {
-    let first = (0..C).min_by_key(|&k| corners[k]).expect("a face has corners");
-    corners[(first + 1) % C] > corners[(first + C - 1) % C]
+pub fn turns(corners: &[u32]) -> bool {
+    let count = corners.len();
+    let first = (0..count).min_by_key(|&k| corners[k]).expect("a face has corners");
+    corners[(first + 1) % count] > corners[(first + count - 1) % count]
 }
 
 #[cfg(test)]
@@ -134,7 +131,7 @@ mod tests {
         let nodes = brick::indices(&brick.all_cells()).flat_map(|cell| brick.tets(cell)).flatten();
         let elements = Elements::new(Kind::Tet4, nodes.map(|n| n as u32).collect());
         let neighbours = Neighbours::new(brick.node_count() as usize, &elements);
-        assert_eq!(neighbours.overlapping, 0);
+        assert!(neighbours.overlapping.is_empty());
         let turned = |t: [u32; 3]| (0..3).map(|k| [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]).min();
         let mut outer: Vec<_> = neighbours.outer(&elements).map(|face| turned(face.try_into().unwrap())).collect();
         let of_brick = Face::ALL.into_iter().flat_map(|face| brick.triangles_on(face).collect::<Vec<_>>());
@@ -157,7 +154,7 @@ mod tests {
         let nodes = (0..brick.cell_count()).flat_map(|cell| brick.hexahedron(cell));
         let elements = Elements::new(Kind::Hex8, nodes.map(|n| n as u32).collect());
         let neighbours = Neighbours::new(brick.node_count() as usize, &elements);
-        assert_eq!(neighbours.overlapping, 0);
+        assert!(neighbours.overlapping.is_empty());
         assert_eq!(neighbours.outer(&elements).count(), 2 * (3 * 2 + 3 * 2 + 2 * 2));
         assert_eq!(neighbours.inner(&elements).count(), 2 * 4 + 3 * 2 + 3 * 2);
         // From outside: the area vectors of each side look outwards.
@@ -182,7 +179,7 @@ mod tests {
     fn an_edge_is_no_face_and_faces_with_two_elements_on_a_side_overlap() {
         let count = |nodes: &[[u32; 4]]| {
             let neighbours = Neighbours::new(6, &tets(nodes));
-            (neighbours.overlapping, (0..nodes.len()).flat_map(|tet| neighbours.of(tet)).count())
+            (neighbours.overlapping.len(), (0..nodes.len()).flat_map(|tet| neighbours.of(tet)).count())
         };
         assert_eq!(count(&[[0, 1, 2, 3], [0, 1, 4, 5]]), (0, 0));
         assert_eq!(count(&[[0, 1, 2, 3], [0, 2, 1, 4]]), (0, 2));

@@ -5,15 +5,21 @@
 //! are so put on the curve too. A lattice point has a key that is the same from every block, so that blocks share their
 //! nodes. Directions on the sphere are those of the far faces of a cube, at equal angles (Ronchi, Iacono and Paolucci,
 //! "The cubed sphere", 1996): three blocks.
+//!
+//! Each rank makes its share of the cells and the nodes that these need. Nodes are numbered as if one had gone from cell to
+//! cell, for each to its corners and then along its elements, and numbered what was new. The first cell that has a lattice
+//! point, and how many points are in cells before, have closed forms; so every rank knows the number of any node.
 
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
 use std::f64::consts::FRAC_PI_4;
 
-use super::brick::{HEXAHEDRON, indices};
-use super::faces::Neighbours;
-use super::solid::NamedSurface;
-use super::{Elements, SolidMesh, split};
+use super::brick::HEXAHEDRON;
+use super::portion::Portion;
+use super::solid::{Counts, NamedSurface};
+use super::{SolidMesh, split};
+use crate::comm::Comm;
+use crate::comm::words::share;
 use crate::element::{Cell, Kind};
 
 /// A body.
@@ -48,35 +54,141 @@ pub enum Mapped {
 /// of the block.
 type Key = [usize; 4];
 
+/// A cell: its block, and its place there.
+type Place = (usize, [usize; 3]);
+
 impl Mapped {
-    /// The mesh, of elements of a kind.
-    pub fn mesh(&self, kind: Kind) -> SolidMesh {
-        let mut nodes = Nodes::default();
-        let (mut elements, mut cells) = (Vec::new(), 0);
-        for (block, size) in self.blocks().into_iter().enumerate() {
-            for cell in indices(&size.map(|n| 0..n)) {
-                let corner = |v: usize| std::array::from_fn(|a| 2 * (cell[a] + (v >> a & 1)));
-                let corners = HEXAHEDRON.map(|v| nodes.number(self.key(block, corner(v))));
-                cells += 1;
-                let mut add = |corners: &[u32]| {
-                    elements.extend(corners);
-                    elements.extend(kind.middles().iter().map(|&(a, b)| nodes.middle(corners[a], corners[b])));
-                };
-                match kind.cell() {
-                    Cell::Hexahedron => add(&corners),
-                    Cell::Tetrahedron => split::tetrahedra(&corners, |tet| add(&tet)),
+    /// The mesh, of elements of a kind; each rank makes its share of the cells.
+    pub fn mesh(&self, comm: &dyn Comm, kind: Kind) -> SolidMesh {
+        let cells: u64 = self.blocks().iter().map(|size| size.iter().product::<usize>() as u64).sum();
+        let nodes: u64 = (0..self.blocks().len()).map(|block| self.lattice(block, kind).iter().product::<u64>()).sum();
+        let (per_cell, own) = (kind.cell().per_hexahedron(), share(cells, comm));
+        let mut surfaces: Vec<NamedSurface> = Vec::new();
+        surfaces.extend(self.surfaces().iter().map(|s| NamedSurface { name: s.0.to_owned(), faces: Vec::new() }));
+        let (mut known, mut of_elements) = (HashMap::new(), Vec::new());
+        for cell in own.clone().map(|cell| self.cell(cell)) {
+            let keys = self.elements(cell, kind);
+            let begin = of_elements.len();
+            of_elements.extend(keys.iter().map(|key| self.number(*key, kind, &mut known)));
+            if !self.is_at_end(cell) {
+                continue;
+            }
+            for (nodes, keys) in of_elements[begin..].chunks(kind.nodes()).zip(keys.chunks(kind.nodes())) {
+                for face in kind.faces() {
+                    for (surface, (_, axis, at)) in surfaces.iter_mut().zip(self.surfaces()) {
+                        if face.iter().all(|&k| keys[k][axis] == at) {
+                            surface.faces.push(face.iter().map(|&k| nodes[k]).collect());
+                        }
+                    }
                 }
             }
         }
-        let points = nodes.keys.iter().map(|&key| self.place(key)).collect();
-        let elements = Elements::new(kind, elements);
-        let outer: Vec<Vec<u32>> = Neighbours::new(nodes.keys.len(), &elements).outer(&elements).collect();
-        let surface = |(name, axis, at): (&str, usize, usize)| {
-            let on = |face: &&Vec<u32>| face.iter().all(|&n| nodes.keys[n as usize][axis] == at);
-            NamedSurface { name: name.to_owned(), faces: outer.iter().filter(on).cloned().collect() }
+        let keys: HashMap<u32, Key> = known.into_iter().map(|(key, number)| (number, key)).collect();
+        let portion = Portion::new(kind, (per_cell * own.start) as u32, &of_elements, |node| self.place(keys[&node]));
+        let counts = Counts { nodes, cells, elements: per_cell * cells };
+        SolidMesh { pieces: vec![0; portion.len()], portion, surfaces, piece_count: 1, counts }
+    }
+
+    /// A cell by its number, x fastest, block after block.
+    fn cell(&self, number: u64) -> Place {
+        let mut rest = number as usize;
+        for (block, size) in self.blocks().into_iter().enumerate() {
+            let cells: usize = size.iter().product();
+            if rest < cells {
+                return (block, [rest % size[0], rest / size[0] % size[1], rest / (size[0] * size[1])]);
+            }
+            rest -= cells;
+        }
+        panic!("there is no cell {number}")
+    }
+
+    fn is_at_end(&self, (block, cell): Place) -> bool {
+        let size = self.blocks()[block];
+        (0..3).any(|a| cell[a] == 0 || cell[a] + 1 == size[a])
+    }
+
+    /// Corners of a cell.
+    fn corners(&self, (block, cell): Place) -> [Key; 8] {
+        HEXAHEDRON.map(|v| self.key(block, std::array::from_fn(|a| 2 * (cell[a] + (v >> a & 1)))))
+    }
+
+    /// Nodes of the elements of a cell, element after element.
+    fn elements(&self, cell: Place, kind: Kind) -> Vec<Key> {
+        let corners = self.corners(cell);
+        let mut nodes = Vec::new();
+        let mut add = |corners: &[Key]| {
+            nodes.extend(corners);
+            let middle =
+                |&(a, b): &(usize, usize)| -> Key { std::array::from_fn(|k| (corners[a][k] + corners[b][k]) / 2) };
+            nodes.extend(kind.middles().iter().map(middle));
         };
-        let surfaces = self.surfaces().into_iter().map(surface).collect();
-        SolidMesh { points, elements, cells, surfaces, regions: Vec::new(), pieces: Vec::new() }
+        match kind.cell() {
+            Cell::Hexahedron => add(&corners),
+            Cell::Tetrahedron => {
+                let numbers = corners.map(|key| self.number_of_corner(key, kind));
+                let key = |number: u32| corners[numbers.iter().position(|&n| n == number).expect("it is a corner")];
+                split::tetrahedra(&numbers, |tet| add(&tet.map(key)));
+            }
+        }
+        nodes
+    }
+
+    /// The number of a node. `known` has some, and then also those of all nodes that are first in the same cell.
+    fn number(&self, key: Key, kind: Kind, known: &mut HashMap<Key, u32>) -> u32 {
+        if let Some(&number) = known.get(&key) {
+            return number;
+        }
+        let cell = self.first_cell(key);
+        let mut next = self.nodes_before(cell, kind) as u32;
+        for key in self.corners(cell).into_iter().chain(self.elements(cell, kind)) {
+            if self.first_cell(key) == cell && !known.contains_key(&key) {
+                known.insert(key, next);
+                next += 1;
+            }
+        }
+        known[&key]
+    }
+
+    /// The number of a corner.
+    fn number_of_corner(&self, key: Key, kind: Kind) -> u32 {
+        let cell = self.first_cell(key);
+        let new = self.corners(cell).into_iter().filter(|&other| self.first_cell(other) == cell);
+        self.nodes_before(cell, kind) as u32 + new.take_while(|&other| other != key).count() as u32
+    }
+
+    /// The first cell that has a lattice point.
+    fn first_cell(&self, key: Key) -> Place {
+        let (block, at) = match self {
+            Self::Sphere { cells: [around, _], .. } => {
+                let block = (0..3).find(|&block| key[block] == 2 * around).expect("it is on a far face of the cube");
+                (block, [key[(block + 1) % 3], key[(block + 2) % 3], key[3]])
+            }
+            _ => (0, [key[0], key[1], key[2]]),
+        };
+        (block, at.map(|position| position.saturating_sub(1) / 2))
+    }
+
+    /// Whether the last nodes along an axis of a block are those of a block before.
+    fn is_shared(&self, block: usize, axis: usize) -> bool {
+        matches!((block, axis), (1, 1) | (2, 0 | 1))
+    }
+
+    /// Nodes along each axis of a block that no block before has.
+    fn lattice(&self, block: usize, kind: Kind) -> [u64; 3] {
+        let size = self.blocks()[block];
+        [0, 1, 2].map(|a| (kind.degree() * size[a] + 1 - usize::from(self.is_shared(block, a))) as u64)
+    }
+
+    /// Nodes whose first cell is before this one.
+    fn nodes_before(&self, (block, cell): Place, kind: Kind) -> u64 {
+        let (degree, size, all) = (kind.degree(), self.blocks()[block], self.lattice(block, kind));
+        let before = |a: usize| if cell[a] == 0 { 0 } else { (degree * cell[a] + 1) as u64 };
+        let here = |a: usize| {
+            let is_shared = cell[a] + 1 == size[a] && self.is_shared(block, a);
+            (degree + usize::from(cell[a] == 0) - usize::from(is_shared)) as u64
+        };
+        let of_blocks: u64 = (0..block).map(|block| self.lattice(block, kind).iter().product::<u64>()).sum();
+        of_blocks + all[0] * all[1] * before(2) + here(2) * (all[0] * before(1) + here(1) * before(0))
     }
 
     /// Cells of each block along its axes.
@@ -148,34 +260,13 @@ fn between([inner, outer]: &[f64; 2], share: f64) -> f64 {
     if share == 1.0 { *outer } else { inner + share * (outer - inner) }
 }
 
-/// Nodes in the order in which elements ask for them.
-#[derive(Default)]
-struct Nodes {
-    keys: Vec<Key>,
-    numbers: HashMap<Key, u32>,
-}
-
-impl Nodes {
-    fn number(&mut self, key: Key) -> u32 {
-        let next = self.keys.len() as u32;
-        let number = *self.numbers.entry(key).or_insert(next);
-        if number == next {
-            self.keys.push(key);
-        }
-        number
-    }
-
-    /// Between two corners of a cell.
-    fn middle(&mut self, a: u32, b: u32) -> u32 {
-        let (a, b) = (self.keys[a as usize], self.keys[b as usize]);
-        self.number(std::array::from_fn(|k| (a[k] + b[k]) / 2))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::comm::solo::Solo;
+    use crate::comm::threads;
     use crate::element::sample::samples;
+    use crate::mesh::faces::Neighbours;
     use crate::mesh::quality::Quality;
     use crate::mesh::surface::areas;
     use crate::vector::length;
@@ -191,15 +282,15 @@ mod tests {
 
     fn volume(mesh: &SolidMesh) -> f64 {
         let of = |nodes: &[u32]| {
-            let places: Vec<[f64; 3]> = nodes.iter().map(|&n| mesh.points[n as usize]).collect();
-            samples(mesh.elements.kind(), &places).iter().map(|s| s.weight).sum::<f64>()
+            let places: Vec<[f64; 3]> = nodes.iter().map(|&n| mesh.portion.points[n as usize]).collect();
+            samples(mesh.portion.elements.kind(), &places).iter().map(|s| s.weight).sum::<f64>()
         };
-        mesh.elements.iter().map(of).sum()
+        mesh.portion.elements.iter().map(of).sum()
     }
 
     fn area(mesh: &SolidMesh, surface: &str) -> f64 {
         let of = |face: &Vec<u32>| {
-            let places: Vec<[f64; 3]> = face.iter().map(|&n| mesh.points[n as usize]).collect();
+            let places: Vec<[f64; 3]> = face.iter().map(|&n| mesh.portion.points[n as usize]).collect();
             areas(&places).iter().sum::<f64>()
         };
         mesh.surface(surface).iter().map(of).sum()
@@ -217,14 +308,18 @@ mod tests {
                 (&CYLINDER, 0.25 * PI * 3e4 * 30.0, 50.0 * PI * 30.0),
                 (&grid(), 18.0, 0.0),
             ] {
-                let mesh = body.mesh(kind);
-                let quality = Quality::of(&mesh);
+                let mesh = body.mesh(&Solo, kind);
+                let quality = Quality::of(&Solo, &mesh.portion);
                 assert!(quality.is_sound() && quality.worst_shape > 0.05, "{kind:?} {quality:?}");
-                assert_eq!(mesh.elements.len() as u64, kind.cell().per_hexahedron() * mesh.cells);
-                let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
-                assert_eq!(neighbours.overlapping, 0);
+                assert_eq!(mesh.portion.elements.len() as u64, kind.cell().per_hexahedron() * mesh.counts.cells);
+                let neighbours = Neighbours::new(mesh.portion.points.len(), &mesh.portion.elements);
+                assert!(neighbours.overlapping.is_empty());
                 let named: usize = mesh.surfaces.iter().map(|s| s.faces.len()).sum();
-                assert_eq!(named, neighbours.outer(&mesh.elements).count(), "every outer face is on one surface");
+                assert_eq!(
+                    named,
+                    neighbours.outer(&mesh.portion.elements).count(),
+                    "every outer face is on one surface"
+                );
                 assert!((volume(&mesh) / exact - 1.0).abs() < facets, "{kind:?} {}", volume(&mesh) / exact);
                 if inner > 0.0 {
                     assert!((area(&mesh, "inner") / inner - 1.0).abs() < facets, "{kind:?} {curved}");
@@ -237,11 +332,14 @@ mod tests {
     fn nodes_are_on_the_surfaces_that_they_are_named_for() {
         for kind in KINDS {
             for body in [SPHERE, CYLINDER] {
-                let mesh = body.mesh(kind);
+                let mesh = body.mesh(&Solo, kind);
                 let is_sphere = matches!(body, Mapped::Sphere { .. });
                 let on = |name: &str, holds: &dyn Fn([f64; 3]) -> bool| {
                     let mut nodes = mesh.surface(name).iter().flatten();
-                    assert!(!mesh.surface(name).is_empty() && nodes.all(|&n| holds(mesh.points[n as usize])), "{name}");
+                    assert!(
+                        !mesh.surface(name).is_empty() && nodes.all(|&n| holds(mesh.portion.points[n as usize])),
+                        "{name}"
+                    );
                 };
                 let radius = |[x, y, z]: [f64; 3]| length([x, y, if is_sphere { z } else { 0.0 }]);
                 on("inner", &|x| (radius(x) - 100.0).abs() < 1e-12);
@@ -251,10 +349,50 @@ mod tests {
                 let (name, end) = if is_sphere { ("z0", 0.0) } else { ("top", 30.0) };
                 on(name, &|x| x[2] == end);
             }
-            let (mesh, origin) = (grid().mesh(kind), [0.0, -1.0, 2.0]);
+            let (mesh, origin) = (grid().mesh(&Solo, kind), [0.0, -1.0, 2.0]);
             for axis in 0..3 {
                 let nodes = mesh.surface(["xmin", "ymin", "zmin"][axis]).iter().flatten();
-                assert!(nodes.map(|&n| mesh.points[n as usize][axis]).all(|x| x == origin[axis]));
+                assert!(nodes.map(|&n| mesh.portion.points[n as usize][axis]).all(|x| x == origin[axis]));
+            }
+        }
+    }
+
+    /// Nodes are numbered from cell to cell, and that is the same on any ranks.
+    #[test]
+    fn numbers_are_those_of_a_walk_along_the_cells_on_any_ranks() {
+        let sphere = Mapped::Sphere { radii: [1.0, 2.0], cells: [1, 1] };
+        for (kind, body) in
+            KINDS.into_iter().flat_map(|kind| [SPHERE, CYLINDER, grid(), sphere.clone()].map(|b| (kind, b)))
+        {
+            let mut known = HashMap::new();
+            let mut walked = Vec::new();
+            for cell in (0..body.mesh(&Solo, kind).counts.cells).map(|cell| body.cell(cell)) {
+                let mut number = |key: Key| {
+                    let next = known.len() as u32;
+                    *known.entry(key).or_insert(next)
+                };
+                for key in body.corners(cell) {
+                    number(key);
+                }
+                walked.extend(body.elements(cell, kind).into_iter().map(number));
+            }
+            let alone = body.mesh(&Solo, kind);
+            assert!(alone.portion.elements.nodes() == walked && alone.counts.nodes == known.len() as u64, "{kind:?}");
+            assert!(known.iter().all(|(&key, &node)| body.place(key) == alone.portion.points[node as usize]));
+            for ranks in [2, 5] {
+                let parts = threads::run(ranks, |comm| body.mesh(comm, kind));
+                let global = |mesh: &SolidMesh| -> Vec<u32> {
+                    mesh.portion.elements.nodes().iter().map(|&n| mesh.portion.nodes[n as usize]).collect()
+                };
+                assert_eq!(parts.iter().flat_map(global).collect::<Vec<_>>(), walked);
+                for (k, surface) in alone.surfaces.iter().enumerate() {
+                    let faces = parts.iter().flat_map(|part| part.surfaces[k].faces.clone());
+                    assert_eq!(faces.collect::<Vec<_>>(), surface.faces, "{}", surface.name);
+                }
+                for part in parts {
+                    let own = part.portion.nodes.iter().map(|&node| alone.portion.points[node as usize]);
+                    assert!(own.eq(part.portion.points.iter().copied()) && part.counts == alone.counts);
+                }
             }
         }
     }

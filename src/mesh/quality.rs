@@ -3,7 +3,9 @@
 //! Only solvability is judged here: a small positive shape (`Kind::shape`) costs accuracy
 //! and is merely reported.
 
-use super::SolidMesh;
+use super::portion::Portion;
+use crate::comm::Comm;
+use crate::comm::words::{least, sum};
 use crate::element::DEGENERATE;
 
 /// What is wrong with a mesh, if anything.
@@ -22,27 +24,32 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Judges the elements of a mesh.
-    pub fn of(mesh: &SolidMesh) -> Self {
-        let mut quality = Self { elements: 0, inverted: 0, degenerate: 0, worst_shape: 1.0, first: None };
-        for nodes in &mesh.elements {
-            quality.elements += 1;
-            let places: Vec<[f64; 3]> = nodes.iter().map(|&n| mesh.points[n as usize]).collect();
-            let shape = mesh.elements.kind().shape(&places);
+    /// Judges the elements that all ranks have of a mesh. Collective.
+    pub fn of(comm: &dyn Comm, portion: &Portion) -> Self {
+        let (mut inverted, mut degenerate, mut worst, mut first) = (0, 0, 1.0_f64, None::<[u64; 4]>);
+        for (element, &number) in portion.numbers.iter().enumerate() {
+            let places = portion.places(element);
+            let shape = portion.elements.kind().shape(&places);
             if shape > DEGENERATE {
-                quality.worst_shape = quality.worst_shape.min(shape);
+                worst = worst.min(shape);
                 continue;
             }
             if shape < -DEGENERATE {
-                quality.inverted += 1;
+                inverted += 1;
             } else {
-                quality.degenerate += 1;
+                degenerate += 1;
             }
-            let count = places.len() as f64;
-            let centre = || std::array::from_fn(|a| places.iter().map(|place| place[a] / count).sum());
-            quality.first.get_or_insert_with(centre);
+            if first.is_none_or(|[first, ..]| u64::from(number) < first) {
+                let count = places.len() as f64;
+                let [x, y, z] = [0, 1, 2].map(|a| places.iter().map(|place| place[a] / count).sum::<f64>().to_bits());
+                first = Some([number.into(), x, y, z]);
+            }
         }
-        quality
+        let sums = sum(comm, vec![portion.len() as u64, inverted, degenerate]);
+        // Numbers that are not negative are in the order of their bits.
+        let worst = least(comm, Some([worst.to_bits()])).map_or(1.0, |[bits]| f64::from_bits(bits));
+        let first = least(comm, first).map(|[_, x, y, z]| [x, y, z].map(f64::from_bits));
+        Self { elements: sums[0], inverted: sums[1], degenerate: sums[2], worst_shape: worst, first }
     }
 
     /// Whether every element has a positive volume.
@@ -54,13 +61,12 @@ impl Quality {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::comm::solo::Solo;
     use crate::element::Kind;
-    use crate::mesh::Elements;
 
     fn of_tets(tets: &[[[f64; 3]; 4]]) -> Quality {
-        let elements = Elements::new(Kind::Tet4, (0..4 * tets.len() as u32).collect());
-        let (points, surfaces, regions, pieces) = (tets.concat(), Vec::new(), Vec::new(), Vec::new());
-        Quality::of(&SolidMesh { points, elements, cells: 0, surfaces, regions, pieces })
+        let (nodes, points) = ((0..4 * tets.len() as u32).collect::<Vec<_>>(), tets.concat());
+        Quality::of(&Solo, &Portion::new(Kind::Tet4, 0, &nodes, |node| points[node as usize]))
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::contacts::{self, Contacts};
 use super::extent::{self, Extent};
 use super::meshes::{MeshError, Meshes};
 use crate::assembly::loads::Load;
-use crate::comm::Comm;
+use crate::comm::{Comm, maximum};
 use crate::constraint::links::Linked;
 use crate::constraint::{Constraints, Support};
 use crate::decomposition::{self, Bodies, BodyMesh, Cut, Decomposition, Patch, Surface, cost};
@@ -41,7 +41,7 @@ pub struct Discrete {
     pub right_hand_sides: RightHandSides,
     /// What the user should know of the meshes.
     pub warnings: Vec<String>,
-    /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
+    /// Largest resident memory of a rank until meshes that are no bricks were read or made, and cut, in MiB.
     pub reading_mb: Option<f64>,
 }
 
@@ -68,12 +68,12 @@ pub fn discretise_expecting(
     let named = Named::new(scene, &bodies);
 
     // Subdomains.
-    let torn = Bodies { bodies: &bodies, meshes: &solids, surfaces: &named.surfaces };
+    let torn = Bodies { bodies: &bodies, surfaces: &named.surfaces };
     let cut = cut(&scene.decomposition.method, &bodies);
     can_be_cut(scene, &bodies, cut)?;
     let tetrahedra = decomposition::tetrahedra(&bodies);
-    let decomposition = decomposition::tear(&torn, cut, &|count| groups(scene, count, tetrahedra), yielding, comm);
-    drop(solids);
+    let groups = |count| groups(scene, count, tetrahedra);
+    let decomposition = decomposition::tear(&torn, solids, cut, &groups, yielding, comm);
     let reading_mb = reading_mb(&bodies, comm);
 
     // What holds, touches and loads them.
@@ -170,10 +170,9 @@ fn load(scene: &Scene, load: &scene::Load, named: &Named) -> Load {
     }
 }
 
-/// Rank 0's largest resident memory so far if it has read a mesh. Collective.
+/// The largest resident memory of a rank so far if a mesh was read or made. Collective.
 fn reading_mb(bodies: &[BodyMesh], comm: &dyn Comm) -> Option<f64> {
-    let mut megabytes = [peak_rss_mb().unwrap_or(f64::NAN)];
-    comm.broadcast(&mut megabytes);
+    let megabytes = maximum(comm, &[peak_rss_mb().unwrap_or(f64::NAN)]);
     let has_read = bodies.iter().any(|body| body.brick().is_none());
     Some(megabytes[0]).filter(|megabytes| has_read && megabytes.is_finite())
 }

@@ -1,19 +1,19 @@
-//! From the bodies of a scene to their meshes: bricks by formula, other structured bodies made by rank 0, volumes of mesh
-//! files read by it.
+//! From the bodies of a scene to their meshes: bricks by formula, other structured bodies and volumes of mesh files in parts,
+//! one on each rank.
 //!
-//! A file that several bodies name is read once. What rank 0 finds wrong is everybody's error.
+//! A file that several bodies name is read once. What is wrong is found by all ranks together, and everybody's error.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::comm::Comm;
 use crate::comm::agree::root_texts;
+use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::{BodyMesh, Counts, Shape, number_bodies};
 use crate::element::Kind;
-use crate::mesh::boxes::around;
-use crate::mesh::gmsh::{Msh, Problem};
+use crate::mesh::boxes::{Box3, around};
+use crate::mesh::gmsh::{LARGE, Msh, Problem};
 use crate::mesh::placement::Placement;
 use crate::mesh::quality::Quality;
 use crate::mesh::{Brick, Mapped, SolidMesh};
@@ -35,7 +35,7 @@ pub enum MeshError {
 pub struct Meshes {
     /// In the order of the bodies' names.
     pub bodies: Vec<BodyMesh>,
-    /// On rank 0 the meshes of bodies that are no bricks, by body; empty elsewhere.
+    /// This rank's parts of the meshes of bodies that are no bricks, by body.
     pub solids: BTreeMap<usize, SolidMesh>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -47,30 +47,14 @@ impl Meshes {
     /// # Errors
     /// If a file cannot be read, or is not what the scene wants.
     pub fn new(scene: &Scene, comm: &dyn Comm) -> Result<Self, MeshError> {
-        let found = if comm.rank() == 0 { read(scene) } else { Ok(Found::default()) };
-        let texts = match &found {
-            Ok(Found { warnings, .. }) => root_texts(comm, ["", ""].into_iter().chain(warnings.iter().map(|w| &w[..]))),
-            Err(MeshError::Bad(text)) => root_texts(comm, ["bad", text]),
-            Err(MeshError::Unreadable(text)) => root_texts(comm, ["unreadable", text]),
-        };
-        match &texts[0][..] {
-            "bad" => return Err(MeshError::Bad(texts[1].clone())),
-            "unreadable" => return Err(MeshError::Unreadable(texts[1].clone())),
-            _ => {}
-        }
-        let solids = found?.solids;
-        let mine = solids.values().flat_map(|m| [m.points.len() as u64, m.cells, m.elements.len() as u64]).collect();
-        let outgoing = if comm.rank() == 0 { vec![mine; comm.size()] } else { vec![Vec::new(); comm.size()] };
-        let mut counts = comm.all_to_all(outgoing).swap_remove(0).into_iter();
-        let mut shape = |body: &scene::Body| match &body.shape {
+        let Found { solids, warnings } = read(scene, comm)?;
+        let shape = |(index, body): (usize, &scene::Body)| match &body.shape {
             scene::Shape::Brick(b) => brick(b),
-            _ => {
-                let [nodes, cells, elements] = [(); 3].map(|()| counts.next().expect("every mesh is counted"));
-                Shape::Mesh(Counts { nodes, cells, elements })
-            }
+            _ => Shape::Mesh(solids[&index].counts),
         };
-        let bodies = number_bodies(scene.body.values().map(|body| (body.element, shape(body), materials(scene, body))));
-        Ok(Self { bodies, solids, warnings: texts[2..].to_vec() })
+        let shapes = scene.body.values().enumerate();
+        let bodies = number_bodies(shapes.map(|(k, body)| (body.element, shape((k, body)), materials(scene, body))));
+        Ok(Self { bodies, solids, warnings })
     }
 }
 
@@ -100,7 +84,7 @@ fn materials(scene: &Scene, body: &scene::Body) -> Vec<usize> {
     names.iter().map(|name| number(name).expect("a checked scene names its materials")).collect()
 }
 
-/// What rank 0 reads.
+/// What is read or made.
 #[derive(Default)]
 struct Found {
     solids: BTreeMap<usize, SolidMesh>,
@@ -115,7 +99,7 @@ struct FromFile<'a> {
     kind: Kind,
 }
 
-fn read(scene: &Scene) -> Result<Found, MeshError> {
+fn read(scene: &Scene, comm: &dyn Comm) -> Result<Found, MeshError> {
     let mut files: BTreeMap<PathBuf, Vec<FromFile>> = BTreeMap::new();
     for (index, (name, body)) in scene.body.iter().enumerate() {
         if let Some(gmsh) = body.gmsh() {
@@ -129,18 +113,18 @@ fn read(scene: &Scene) -> Result<Found, MeshError> {
     }
     let mut found = Found::default();
     for (path, bodies) in &files {
-        let msh = Msh::read(path).map_err(|problem| {
+        let msh = Msh::read(comm, path, LARGE).map_err(|problem| {
             let text = format!("{}: {problem}", path.display());
-            if matches!(problem, Problem::Read(_)) { MeshError::Unreadable(text) } else { MeshError::Bad(text) }
+            if problem.is_unreadable() { MeshError::Unreadable(text) } else { MeshError::Bad(text) }
         })?;
         for FromFile { index, name, gmsh, kind } in bodies {
             let surfaces: Vec<&str> = surfaces_of(scene, name).into_iter().collect();
             let problem = |problem: Problem| MeshError::Bad(format!("body.{name}: {}: {problem}", path.display()));
             let volumes: Vec<&str> = gmsh.volumes().iter().map(|name| &name[..]).collect();
-            let mut mesh = msh.body(&volumes, &surfaces, *kind).map_err(problem)?;
+            let mut mesh = msh.body(comm, &volumes, &surfaces, *kind).map_err(problem)?;
             join_equal(&scene.body[*name], &volumes, &mut mesh);
             place(gmsh, &mut mesh);
-            found.warnings.extend(check(scene, name, &mesh)?);
+            found.warnings.extend(check(scene, name, &mesh, comm)?);
             found.solids.insert(*index, mesh);
         }
         let used: BTreeSet<_> = bodies.iter().flat_map(|b| b.gmsh.volumes()).collect();
@@ -151,8 +135,8 @@ fn read(scene: &Scene) -> Result<Found, MeshError> {
     }
     for (index, (name, body)) in scene.body.iter().enumerate() {
         if let Some(mapped) = mapped(&body.shape) {
-            let mesh = mapped.mesh(body.element);
-            found.warnings.extend(check(scene, name, &mesh)?);
+            let mesh = mapped.mesh(comm, body.element);
+            found.warnings.extend(check(scene, name, &mesh, comm)?);
             found.solids.insert(index, mesh);
         }
     }
@@ -183,26 +167,26 @@ fn surfaces_of<'a>(scene: &'a Scene, body: &str) -> BTreeSet<&'a str> {
 fn join_equal(body: &scene::Body, volumes: &[&str], mesh: &mut SolidMesh) {
     let names: Vec<&str> = body.material.names().into_iter().collect();
     if names.len() == 1 {
-        mesh.regions.clear();
+        return mesh.portion.wholes.fill(0);
     }
     let region = |volume: &&str| names.iter().position(|name| body.material.of(volume) == Some(name));
     let of_volumes: Vec<Option<usize>> = volumes.iter().map(region).collect();
-    for region in &mut mesh.regions {
+    for region in &mut mesh.portion.wholes {
         *region = of_volumes[*region as usize].expect("every volume of a checked scene has a material") as u32;
     }
 }
 
 fn place(gmsh: &Gmsh, mesh: &mut SolidMesh) {
     let rotation = gmsh.rotate.map(|r| (r.axis, r.angle_deg));
-    Placement { scale: gmsh.scale, rotation, translation: gmsh.translate }.apply(&mut mesh.points);
+    Placement { scale: gmsh.scale, rotation, translation: gmsh.translate }.apply(&mut mesh.portion.points);
 }
 
 /// Elements of worse shape are worth a word.
 const POOR_SHAPE: f64 = 0.01;
 
-/// Looks at one body; returns warnings.
-fn check(scene: &Scene, body: &str, mesh: &SolidMesh) -> Result<Vec<String>, MeshError> {
-    let quality = Quality::of(mesh);
+/// Looks at one body; returns warnings. Collective.
+fn check(scene: &Scene, body: &str, mesh: &SolidMesh, comm: &dyn Comm) -> Result<Vec<String>, MeshError> {
+    let quality = Quality::of(comm, &mesh.portion);
     if !quality.is_sound() {
         // Sound by itself: the coordinates of the scene have lost its digits.
         let keys = match scene.body[body].gmsh() {
@@ -219,14 +203,16 @@ fn check(scene: &Scene, body: &str, mesh: &SolidMesh) -> Result<Vec<String>, Mes
             quality.worst_shape
         ));
     }
-    let pieces = mesh.pieces.iter().max().map_or(1, |&last| last as usize + 1);
+    let pieces = mesh.piece_count;
     if pieces > 1 {
         warnings.push(format!("body {body}: it is in {pieces} pieces that nothing joins; each has to be held"));
     }
-    for (name, held) in held(scene, body, mesh, pieces) {
-        match held.refusal().filter(|_| !scene.touches(body)) {
-            Some(rule) => return Err(MeshError::Bad(format!("body.{name}: {rule}"))),
-            None => warnings.extend(held.warning().filter(|_| warnings.len() < MOST_WARNINGS)),
+    for (name, refusal, warning) in held(scene, body, mesh, comm) {
+        if !refusal.is_empty() && !scene.touches(body) {
+            return Err(MeshError::Bad(format!("body.{name}: {refusal}")));
+        }
+        if !warning.is_empty() && warnings.len() < MOST_WARNINGS {
+            warnings.push(warning);
         }
     }
     Ok(warnings)
@@ -235,32 +221,66 @@ fn check(scene: &Scene, body: &str, mesh: &SolidMesh) -> Result<Vec<String>, Mes
 /// Warnings that one body gives rise to.
 const MOST_WARNINGS: usize = 10;
 
-/// What the supports do for each piece of a body, and what to call it.
-fn held(scene: &Scene, body: &str, mesh: &SolidMesh, pieces: usize) -> Vec<(String, Held)> {
-    let mut of_node = vec![0; mesh.points.len()];
-    let mut rooms = vec![Vec::new(); pieces];
-    for (element, nodes) in mesh.elements.iter().enumerate().filter(|_| pieces > 1) {
-        let piece = mesh.piece(element);
+/// What to call each piece of a body, why to refuse it and what to warn of, if it is not held; else nothing. Rank 0 looks at the
+/// supported nodes. Collective.
+fn held(scene: &Scene, body: &str, mesh: &SolidMesh, comm: &dyn Comm) -> Vec<(String, String, String)> {
+    let SolidMesh { portion, pieces, piece_count, .. } = mesh;
+    let mut of_node = vec![0; portion.nodes.len()];
+    for (nodes, &piece) in portion.elements.iter().zip(pieces) {
         nodes.iter().for_each(|&node| of_node[node as usize] = piece);
-        let places = nodes.iter().map(|&node| &mesh.points[node as usize]);
-        rooms[piece] = around(rooms[piece].iter().chain(places)).to_vec();
     }
-    let mut supported: Vec<Vec<([f64; 3], &[Axis])>> = vec![Vec::new(); pieces];
-    for support in scene.support.values().filter(|s| s.surface.body == body) {
-        let nodes: BTreeSet<u32> = mesh.surface(&support.surface.surface).iter().flatten().copied().collect();
-        for node in nodes.into_iter().map(|node| node as usize) {
-            supported[of_node[node]].push((mesh.points[node], &support.fix));
+    let supports: Vec<&scene::Support> = scene.support.values().filter(|s| s.surface.body == body).collect();
+    let mut mine: BTreeSet<[u64; 6]> = BTreeSet::new();
+    for (k, support) in (0..).zip(&supports) {
+        for node in mesh.surface(&support.surface.surface).iter().flatten() {
+            let own = portion.nodes.binary_search(node).expect("the node is here");
+            let [x, y, z] = portion.points[own].map(f64::to_bits);
+            mine.insert([of_node[own].into(), k, (*node).into(), x, y, z]);
         }
     }
-    let name = |room: &Vec<[f64; 3]>| match room[..] {
-        [low, high] => {
-            let [x, y, z]: [f64; 3] = std::array::from_fn(|a| 0.5 * (low[a] + high[a]));
-            format!("{body}, its piece around ({x:.6}, {y:.6}, {z:.6})")
-        }
-        _ => body.to_owned(),
+    let mut outgoing = vec![Vec::new(); comm.size()];
+    outgoing[0] = mine.into_iter().flatten().collect();
+    let all: BTreeSet<[u64; 6]> =
+        comm.all_to_all(outgoing).iter().flat_map(|theirs| theirs.as_chunks().0).copied().collect();
+    let mut supported: Vec<Vec<([f64; 3], &[Axis])>> = vec![Vec::new(); *piece_count];
+    for [piece, support, _, x, y, z] in all {
+        supported[piece as usize].push(([x, y, z].map(f64::from_bits), &supports[support as usize].fix));
+    }
+    let names = names(body, mesh, comm);
+    let texts = names.iter().zip(&supported).flat_map(|(name, supported)| {
+        let held = Held::at(name, supported);
+        [held.refusal(), held.warning()].map(Option::unwrap_or_default)
+    });
+    let texts: Vec<String> = if comm.rank() == 0 { texts.collect() } else { Vec::new() };
+    let mut texts = root_texts(comm, texts.iter().map(|text| &text[..])).into_iter();
+    let mut next = || texts.next().expect("there are two texts for each piece");
+    names.into_iter().map(|name| (name, next(), next())).collect()
+}
+
+/// What to call each piece of a body. Collective.
+fn names(body: &str, SolidMesh { portion, pieces, piece_count, .. }: &SolidMesh, comm: &dyn Comm) -> Vec<String> {
+    if *piece_count == 1 {
+        return vec![body.to_owned()];
+    }
+    let mut rooms: BTreeMap<u64, Box3> = BTreeMap::new();
+    for (element, &piece) in pieces.iter().enumerate() {
+        let its = around(&portion.places(element));
+        rooms.entry(piece.into()).and_modify(|room| *room = around(room.iter().chain(&its))).or_insert(its);
+    }
+    let words = |(piece, room): (&u64, &Box3)| {
+        std::iter::once(*piece).chain(room.as_flattened().iter().map(|x| x.to_bits())).collect::<Vec<_>>()
     };
-    let each = rooms.iter().zip(&supported);
-    each.map(|(room, supported)| (name(room), Held::at(&name(room), supported))).collect()
+    let mine: Vec<u64> = rooms.iter().flat_map(words).collect();
+    for &[piece, a, b, c, d, e, f] in all_gather_u64(comm, &mine).as_chunks::<7>().0 {
+        let [low, high] = [[a, b, c], [d, e, f]].map(|x| x.map(f64::from_bits));
+        let room = rooms.entry(piece).or_insert([low, high]);
+        *room = around(room.iter().chain([&low, &high]));
+    }
+    let name = |[low, high]: &Box3| {
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|a| 0.5 * (low[a] + high[a]));
+        format!("{body}, its piece around ({x:.6}, {y:.6}, {z:.6})")
+    };
+    rooms.values().map(name).collect()
 }
 
 /// Refuses more subdomains than elements; of bricks alone the scene's own checks do.
@@ -268,8 +288,12 @@ fn count(scene: &Scene, found: &Found) -> Result<(), MeshError> {
     let Method::Metis { subdomains: Some(subdomains) } = scene.decomposition.method else { return Ok(()) };
     let bricks =
         scene.body.values().filter_map(|b| Some(b.brick()?.cell_count() * b.element.cell().per_hexahedron() as usize));
-    let elements =
-        found.solids.values().map(|mesh| mesh.elements.len()).chain(bricks).fold(0_usize, usize::saturating_add);
+    let elements = found
+        .solids
+        .values()
+        .map(|mesh| mesh.counts.elements as usize)
+        .chain(bricks)
+        .fold(0_usize, usize::saturating_add);
     if subdomains <= elements {
         return Ok(());
     }

@@ -34,7 +34,9 @@ impl Plain {
                 size_lines(scene, *level, *ranks, sizes)
             }
             Event::Contact(row) => vec![contact_line(row)],
-            Event::Reading { megabytes } => vec![format!("  {:<16}{megabytes:>12.0}  MiB, rank 0", "reading meshes")],
+            Event::Reading { megabytes } => {
+                vec![format!("  {:<16}{megabytes:>12.0}  MiB, largest rank", "reading meshes")]
+            }
             Event::Memory { megabytes, available_mb } => {
                 let left = available_mb.map(|left| format!("; {left:.0} are available"));
                 let left = left.unwrap_or_default();

@@ -56,7 +56,7 @@ pub struct Summary {
     pub peak_rss_mb: Option<f64>,
     /// That of the rank with the largest, in MiB.
     pub peak_rss_mb_max: Option<f64>,
-    /// Largest resident memory of rank 0 until meshes from files were read and sent out, in MiB.
+    /// Largest resident memory of a rank until meshes that are no bricks were read or made, and cut, in MiB.
     pub mesh_reading_mb: Option<f64>,
     /// What a run would take, in MiB; from `check` only.
     pub memory_estimate_mb: Option<f64>,

@@ -26,21 +26,20 @@ use crate::scene::{Precision, Preconditioner, Scene};
 pub struct Memory {
     /// What ranks hold while solving.
     pub items: Vec<Item>,
-    /// On rank 0 while meshes are cut, before anything else is there, in MiB.
+    /// On each rank, at most, while meshes are read and cut, before anything else is there, in MiB.
     pub cutting_mb: f64,
 }
 
 impl Memory {
     /// Of all ranks together, in MiB.
     pub fn total_mb(&self, ranks: usize) -> f64 {
-        let cutting = self.cutting_mb + PROCESS_MB * ranks as f64;
+        let cutting = (self.cutting_mb + PROCESS_MB) * ranks as f64;
         (ranks as f64 * self.solving_mb(ranks)).max(cutting)
     }
 
     /// Of a rank with its part of the subdomains, in MiB.
-    pub fn of_rank_mb(&self, rank: usize, ranks: usize) -> f64 {
-        let solving = self.solving_mb(ranks);
-        if rank == 0 { solving.max(self.cutting_mb + PROCESS_MB) } else { solving }
+    pub fn of_rank_mb(&self, ranks: usize) -> f64 {
+        self.solving_mb(ranks).max(self.cutting_mb + PROCESS_MB)
     }
 
     /// What a rank of so many owns and what all of them hold, item by item.

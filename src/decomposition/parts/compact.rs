@@ -9,12 +9,10 @@
 //! nor in what order. Nothing is known of the body's boundary: a part may reach across a gap, and what it has there is
 //! another's to take ([`super::pieces`]).
 
-use super::sum;
-use super::wholes::Wholes;
-use crate::comm::{Comm, maximum};
+use crate::comm::Comm;
+use crate::comm::words::sum;
+use crate::mesh::wholes::Wholes;
 
-/// Cells of the grid along the body's longest side.
-const GRID: f64 = (1 << 24) as f64;
 /// Parts that an element may move to: the nearest ones of its own, with itself.
 const NEAREST: usize = 24;
 /// How often centres move with a sample of the elements, and with all of them.
@@ -33,7 +31,7 @@ pub fn compact(comm: &dyn Comm, points: &[[i32; 3]], part: &mut [u32], wholes: &
     let mut cells = vec![Cell::default(); wholes.parts()];
     move_centres(comm, &mut cells, points, part);
     cells.iter_mut().for_each(|cell| cell.weight = cell.spread);
-    let all: u64 = (0..wholes.len() as u32).map(|whole| wholes.size(whole)).sum();
+    let all: u64 = (0..wholes.count() as u32).map(|whole| wholes.size(whole)).sum();
     let stride = (all / (SAMPLE * wholes.parts() as u64)).max(1);
     let sample: Vec<usize> = (0..points.len()).filter(|&at| scattered(points[at]).is_multiple_of(stride)).collect();
     let of_sample: Vec<[i32; 3]> = sample.iter().map(|&at| points[at]).collect();
@@ -59,7 +57,7 @@ fn scattered(point: [i32; 3]) -> u64 {
 fn round(comm: &dyn Comm, (cells, near): (&mut [Cell], &Near), points: &[[i32; 3]], part: &mut [u32], wholes: &Wholes) {
     for _ in 0..ADAPTIONS {
         let sizes = sum(comm, assign(cells, near, points, part));
-        let mut of_wholes = vec![0; wholes.len()];
+        let mut of_wholes = vec![0; wholes.count()];
         (0..).zip(&sizes).for_each(|(part, size)| of_wholes[wholes.of_part(part) as usize] += size);
         let off = |(part, size): (u32, &u64)| {
             let whole = wholes.of_part(part);
@@ -87,22 +85,6 @@ struct Cell {
     /// Mean square of distances from the centre, the last that was not zero.
     spread: f64,
     weight: f64,
-}
-
-/// Points in cells of a grid over those of all ranks. Collective.
-pub fn on_grid(comm: &dyn Comm, points: &[[f64; 3]]) -> Vec<[i32; 3]> {
-    let mut extremes = vec![f64::NEG_INFINITY; 6];
-    for (point, axis) in points.iter().flat_map(|point| (0..3).map(move |axis| (point, axis))) {
-        extremes[axis] = extremes[axis].max(point[axis]);
-        extremes[3 + axis] = extremes[3 + axis].max(-point[axis]);
-    }
-    let extremes = maximum(comm, &extremes);
-    let longest = (0..3).map(|axis| extremes[axis] + extremes[3 + axis]).fold(f64::MIN_POSITIVE, f64::max);
-    let last = GRID as i32 - 1;
-    let place = |point: &[f64; 3]| {
-        std::array::from_fn(|axis| (((point[axis] + extremes[3 + axis]) / longest * GRID) as i32).min(last))
-    };
-    points.iter().map(place).collect()
 }
 
 /// Words a part of [`move_centres`].
@@ -192,6 +174,7 @@ mod tests {
     use super::*;
     use crate::comm::solo::Solo;
     use crate::comm::threads;
+    use crate::mesh::curve::on_grid;
     use crate::random::Random;
 
     /// Points in a cube, four times as dense at one end.

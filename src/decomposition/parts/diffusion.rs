@@ -8,11 +8,11 @@
 //! Each rank has some of the elements and exchanges sums at common nodes. Indicators are integers, so that it does not matter
 //! which elements these are, nor in what order.
 
-use super::common::common;
-use super::portion::Portion;
-use super::sum;
-use super::wholes::Wholes;
 use crate::comm::Comm;
+use crate::comm::common::common;
+use crate::comm::words::sum;
+use crate::mesh::Portion;
+use crate::mesh::wholes::Wholes;
 
 /// An indicator's value inside its part.
 const ONE: u32 = 1 << 16;
@@ -224,6 +224,7 @@ mod tests {
     use super::*;
     use crate::comm::solo::Solo;
     use crate::comm::threads;
+    use crate::decomposition::parts::of_brick;
     use crate::decomposition::{BodyMesh, Shape, number_bodies};
     use crate::element::Kind;
     use crate::mesh::Brick;
@@ -243,7 +244,7 @@ mod tests {
     }
 
     fn smoothed(body: &BodyMesh, comm: &dyn Comm) -> Vec<u32> {
-        let portion = Portion::new(body, None, comm);
+        let portion = of_brick(body, comm);
         let mut part: Vec<u32> = portion.numbers.iter().map(|&number| halves_with_a_tongue(body, number)).collect();
         Ground::new(comm, &portion).smooth(&mut part, &Wholes::new(vec![body.counts().elements], vec![2]));
         part

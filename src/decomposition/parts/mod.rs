@@ -1,39 +1,37 @@
 //! Compact parts of any bodies, cut by all ranks together.
 //!
-//! Rank 0 hands the meshes that it has read out in equal shares, bricks are generated in such shares. Parts start as pieces of a
+//! Each rank has a share of a mesh, and generates one of a brick. Parts start as pieces of a
 //! space-filling curve ([`curve`]), which are rods here and there and have tongues: these bend easily and cost iterations.
 //! They are made compact ([`compact`]), then their faces smooth ([`diffusion`]) and flat ([`sides`]), then whole ([`pieces`]). Regions of bodies
 //! are cut one by one: a part never spans two bodies or two materials. Elements of a body cost the same, as they have one
 //! kind; between bodies they count as so many linear tetrahedra. In the end each rank gets the elements of its own
 //! subdomains, which are shared out by the size of their factors.
 
-mod common;
 mod compact;
-mod curve;
 mod diffusion;
 mod groups;
 mod pieces;
-mod portion;
 mod sides;
-mod wholes;
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::mem::replace;
 
-use self::compact::{compact, on_grid};
+use self::compact::compact;
 use self::diffusion::Ground;
 use self::groups::{Cluster, Faces, clusters, groups};
 use self::pieces::Pieces;
-use self::portion::Portion;
 use self::sides::Sides;
-use self::wholes::{Wholes, spread};
 use super::shares::{interleave, whole_groups};
-use super::subdomain::{pack_pairs, unpack_pairs};
-use super::{Bodies, Clusters, Patch, Shape, Subdomain};
+use super::{Bodies, BodyMesh, Clusters, Patch, Shape, Subdomain};
+use crate::comm::words::{share, sum};
 use crate::comm::{Comm, Shares, all_gather_u64, from_root};
-use crate::mesh::SolidMesh;
-use crate::mesh::connectivity::split_into_pieces;
-use crate::mesh::faces::{Neighbours, key};
+use crate::mesh::curve::{self, on_grid};
+use crate::mesh::faces::key;
+use crate::mesh::joints::Joints;
+use crate::mesh::marked::{Marked, forward};
+use crate::mesh::solid::NamedSurface;
+use crate::mesh::wholes::{Wholes, spread};
+use crate::mesh::{Portion, SolidMesh};
 
 /// No part may have more than so many times the mean number of elements.
 const LARGEST: f64 = 1.25;
@@ -42,12 +40,14 @@ const LARGEST: f64 = 1.25;
 /// on each level. Returns the clusters, the shares and this rank's subdomains. Collective.
 pub(crate) fn own_subdomains(
     bodies: &Bodies,
+    mut meshes: BTreeMap<usize, SolidMesh>,
     parts: usize,
     sizes_of_groups: &[usize],
     comm: &dyn Comm,
 ) -> (Clusters, Shares, Vec<Subdomain>) {
-    let dealt: Vec<Dealt> = (0..bodies.bodies.len()).map(|body| Dealt::new(bodies, body, comm)).collect();
-    let size = |(dealt, body): (&Dealt, &super::BodyMesh)| -> Vec<u64> {
+    let mut deal = |(index, body)| Dealt::new(body, meshes.remove(&index), comm);
+    let dealt: Vec<Dealt> = bodies.bodies.iter().enumerate().map(&mut deal).collect();
+    let size = |(dealt, body): (&Dealt, &BodyMesh)| -> Vec<u64> {
         dealt.sizes.iter().map(|size| size * body.kind.tetrahedra()).collect()
     };
     let sizes: Vec<u64> = dealt.iter().zip(bodies.bodies).flat_map(size).collect();
@@ -79,17 +79,6 @@ pub(crate) fn own_subdomains(
     (clusters, shares, own)
 }
 
-/// Sums over all ranks, entry by entry; sums of integers know no order. Collective.
-fn sum(comm: &dyn Comm, mut mine: Vec<u64>) -> Vec<u64> {
-    if comm.size() > 1 {
-        let all = all_gather_u64(comm, &mine);
-        let length = mine.len().max(1);
-        mine.fill(0);
-        all.chunks_exact(length).for_each(|theirs| mine.iter_mut().zip(theirs).for_each(|(sum, x)| *sum += x));
-    }
-    mine
-}
-
 /// A body before it is cut.
 struct Dealt {
     portion: Portion,
@@ -97,42 +86,48 @@ struct Dealt {
     sizes: Vec<u64>,
     /// Piece of the body and region of each whole.
     of_wholes: Vec<[usize; 2]>,
+    surfaces: Vec<NamedSurface>,
 }
 
 impl Dealt {
-    fn new(bodies: &Bodies, body: usize, comm: &dyn Comm) -> Self {
-        let mesh = bodies.meshes.get(&body);
-        let (wholes, mut table) = mesh.map_or((Vec::new(), Vec::new()), wholes);
-        if let Shape::Brick(_) = bodies.bodies[body].shape {
-            table = vec![[bodies.bodies[body].counts().elements, 0, 0]];
+    /// `mesh` is this rank's part of a body that is no brick. Collective.
+    ///
+    /// # Panics
+    /// If there is none.
+    fn new(body: &BodyMesh, mesh: Option<SolidMesh>, comm: &dyn Comm) -> Self {
+        if let Shape::Brick(_) = body.shape {
+            let (sizes, of_wholes) = (vec![body.counts().elements], vec![[0, 0]]);
+            return Self { portion: of_brick(body, comm), sizes, of_wholes, surfaces: Vec::new() };
         }
-        let table = from_root(comm, table.into_flattened());
-        let table = table.as_chunks::<3>().0;
-        Self {
-            portion: Portion::new(&bodies.bodies[body], mesh.map(|mesh| (mesh, wholes)), comm),
-            sizes: table.iter().map(|row| row[0]).collect(),
-            of_wholes: table.iter().map(|row| [row[1] as usize, row[2] as usize]).collect(),
+        let SolidMesh { mut portion, pieces, surfaces, piece_count, .. } =
+            mesh.expect("every rank has its part of a mesh");
+        let (wholes, count) = match body.materials.len() {
+            1 => (pieces.clone(), piece_count),
+            _ => Joints::new(comm, &portion).pieces(comm, &portion, &portion.wholes),
+        };
+        // Some element of each whole tells its piece and its region.
+        let (mut sizes, mut of_wholes) = (vec![0; count], vec![0; 2 * count]);
+        for ((&whole, &piece), &region) in wholes.iter().zip(&pieces).zip(&portion.wholes) {
+            sizes[whole as usize] += 1;
+            of_wholes[2 * whole as usize..][..2].copy_from_slice(&[1 + u64::from(piece), 1 + u64::from(region)]);
         }
+        portion.wholes = wholes;
+        let told = all_gather_u64(comm, &of_wholes);
+        for theirs in told.chunks_exact(of_wholes.len()) {
+            of_wholes.iter_mut().zip(theirs).for_each(|(mine, its)| *mine = (*mine).max(*its));
+        }
+        let of_wholes = of_wholes.as_chunks::<2>().0.iter().map(|of| of.map(|k| k as usize - 1)).collect();
+        Self { portion, sizes: sum(comm, sizes), of_wholes, surfaces }
     }
 }
 
-/// The whole of each element of a mesh; and of each whole its number of elements, its piece of the body and its region.
-fn wholes(mesh: &SolidMesh) -> (Vec<u32>, Vec<[u64; 3]>) {
-    let elements = mesh.elements.len();
-    let mut of_elements: Vec<i32> = (0..elements).map(|element| mesh.region(element) as i32).collect();
-    if mesh.regions.is_empty() {
-        (0..).zip(&mut of_elements).for_each(|(element, whole)| *whole = mesh.piece(element) as i32);
-    } else {
-        let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
-        split_into_pieces(&mut of_elements, |element| neighbours.of(element));
-    }
-    let count = of_elements.iter().max().map_or(0, |&last| last as usize + 1);
-    let mut table = vec![[0; 3]; count];
-    for (element, &whole) in of_elements.iter().enumerate() {
-        let row = &mut table[whole as usize];
-        *row = [row[0] + 1, mesh.piece(element) as u64, mesh.region(element) as u64];
-    }
-    (of_elements.into_iter().map(|whole| whole as u32).collect(), table)
+/// This rank's share in a brick, which it generates.
+fn of_brick(body: &BodyMesh, comm: &dyn Comm) -> Portion {
+    let lattice = body.lattice().expect("the body is a brick");
+    let own = share(body.counts().elements, comm);
+    let nodes: Vec<u32> = own.clone().flat_map(|number| body.element(number)).map(|node| node as u32).collect();
+    let point = |node: u32| lattice.coordinates(lattice.node_position(u64::from(node)));
+    Portion::new(body.kind, own.start as u32, &nodes, point)
 }
 
 /// How a body is cut.
@@ -143,12 +138,18 @@ struct Cut {
     sizes: Vec<u64>,
     clusters: Vec<Cluster>,
     of_wholes: Vec<[usize; 2]>,
+    surfaces: Vec<NamedSurface>,
 }
 
 impl Cut {
     /// Into so many parts of each whole, in clusters of about so many. Where compact parts are too few or one is large, as on meshes
     /// whose sizes differ much, only faces are made smooth, or nothing is done. Collective.
-    fn new(Dealt { portion, sizes, of_wholes }: Dealt, parts: Vec<u32>, groups: &[usize], comm: &dyn Comm) -> Self {
+    fn new(
+        Dealt { portion, sizes, of_wholes, surfaces }: Dealt,
+        parts: Vec<u32>,
+        groups: &[usize],
+        comm: &dyn Comm,
+    ) -> Self {
         let wholes = Wholes::new(sizes, parts);
         let rank = |part: u32| part as usize * comm.size() / wholes.parts();
         let mut portion = portion;
@@ -156,7 +157,7 @@ impl Cut {
         portion.part = curve::start(comm, &start(&portion), &portion.wholes, &wholes);
         portion = portion.sent(comm, |at| rank(portion.part[at]));
         let (ground, sides) = (Ground::new(comm, &portion), Sides::new(comm, &portion));
-        let is_cut = wholes.parts() > wholes.len();
+        let is_cut = wholes.parts() > wholes.count();
         for (is_compact, is_smooth) in [(true, true), (false, true), (false, false)] {
             if is_smooth && !is_cut {
                 continue;
@@ -174,7 +175,7 @@ impl Cut {
             let is_even = |(part, &size): (usize, &u64)| size as f64 <= LARGEST * wholes.mean(cut.1[part]);
             let is_sound = cut.0.sizes.len() >= wholes.parts() && cut.0.sizes.iter().enumerate().all(is_even);
             if is_sound || !is_smooth {
-                return Self { of_wholes, ..cut.0 };
+                return Self { of_wholes, surfaces, ..cut.0 };
             }
         }
         unreachable!("the last cut is taken")
@@ -207,14 +208,14 @@ impl Cut {
             of
         };
         let clusters = clusters(count, &levels.iter().map(of_level).collect::<Vec<_>>());
-        (Self { portion, sizes, clusters, of_wholes: Vec::new() }, of)
+        (Self { portion, sizes, clusters, of_wholes: Vec::new(), surfaces: Vec::new() }, of)
     }
 
     /// Own subdomains, from the number and the owner of each part. Collective.
     fn subdomains(self, bodies: &Bodies, body: usize, places: &[(usize, usize)], comm: &dyn Comm) -> Vec<Subdomain> {
         let part = &self.portion.part;
         let portion = self.portion.sent(comm, |at| places[part[at] as usize].1);
-        let surfaces = surfaces(bodies, body, comm);
+        let surfaces = marks(bodies, body, &self.surfaces, &portion, comm);
         let mut order: Vec<usize> = (0..portion.len()).collect();
         order.sort_unstable_by_key(|&at| (portion.part[at], portion.numbers[at]));
         let subdomain = |places_here: &[usize]| {
@@ -258,29 +259,15 @@ fn costs(portion: &Portion, parts: usize, comm: &dyn Comm) -> Vec<u64> {
     sum(comm, nodes).into_iter().map(|nodes| (nodes as f64).powf(4.0 / 3.0) as u64).collect()
 }
 
-/// Named surfaces of the boundary faces of a mesh, by ascending nodes, on every rank; none of a brick. Collective.
-fn surfaces(bodies: &Bodies, body: usize, comm: &dyn Comm) -> HashMap<Vec<u32>, Vec<usize>> {
-    let mut result: HashMap<_, Vec<usize>> = HashMap::new();
-    if let Shape::Brick(_) = bodies.bodies[body].shape {
-        return result;
-    }
-    let nodes = bodies.bodies[body].kind.faces()[0].len();
+/// Named surfaces of a mesh's faces that have their least node here; none of a brick. Collective.
+fn marks(bodies: &Bodies, body: usize, named: &[NamedSurface], portion: &Portion, comm: &dyn Comm) -> Marked {
+    let mut faces = Vec::new();
     for (index, surface) in bodies.surfaces.iter().enumerate().filter(|(_, s)| s.body == body) {
         let Patch::Named(name) = &surface.patch else { continue };
-        let mut message = Vec::new();
-        if let Some(mesh) = bodies.meshes.get(&body) {
-            let faces: Vec<u32> = mesh.surface(name).iter().flatten().copied().collect();
-            message.push(faces.len() as u64);
-            pack_pairs(&faces, &mut message);
-        }
-        let mut message = from_root(comm, message).into_iter();
-        let mut next = || message.next().expect("a packed surface is whole");
-        let count = next() as usize;
-        for face in unpack_pairs(count, &mut next).chunks_exact(nodes) {
-            result.entry(key(face)).or_default().push(index);
-        }
+        let own = named.iter().filter(|surface| surface.name == *name).flat_map(|surface| &surface.faces);
+        faces.extend(own.map(|face| (key(face), index)));
     }
-    result
+    forward(comm, &portion.nodes, portion.elements.kind().faces()[0].len(), &faces)
 }
 
 #[cfg(test)]

@@ -6,11 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use super::portion::Portion;
-use super::wholes::Wholes;
 use crate::comm::{Comm, all_gather_u64};
+use crate::mesh::Portion;
 use crate::mesh::connectivity::split_into_pieces;
 use crate::mesh::faces::{Neighbours, OUTSIDE};
+use crate::mesh::wholes::Wholes;
 
 /// A piece of more than this part of the mean size of parts is no small one.
 const LARGE: f64 = 0.25;

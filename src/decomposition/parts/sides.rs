@@ -5,12 +5,12 @@
 
 use std::collections::HashMap;
 
-use super::common::common;
-use super::portion::Portion;
-use super::wholes::Wholes;
 use crate::comm::Comm;
+use crate::comm::common::common;
+use crate::mesh::Portion;
 use crate::mesh::faces::{Neighbours, OUTSIDE};
 use crate::mesh::surface::area_vector;
+use crate::mesh::wholes::Wholes;
 use crate::vector::dot;
 
 /// How often elements may move; to parts of higher and of lower number by turns, so that no two neighbours change places.
@@ -109,6 +109,7 @@ mod tests {
     use super::*;
     use crate::comm::solo::Solo;
     use crate::comm::threads;
+    use crate::decomposition::parts::of_brick;
     use crate::decomposition::{BodyMesh, Shape, number_bodies};
     use crate::element::Kind;
     use crate::mesh::Brick;
@@ -124,7 +125,7 @@ mod tests {
 
     /// What becomes of two parts, the second having these cells.
     fn flattened(body: &BodyMesh, comm: &dyn Comm, is_second: impl Fn([usize; 3]) -> bool) -> Vec<u32> {
-        let portion = Portion::new(body, None, comm);
+        let portion = of_brick(body, comm);
         let place = |&number: &u32| {
             let cell = (u64::from(number) / body.kind.cell().per_hexahedron()) as usize;
             u32::from(is_second([cell % CELLS[0], cell / CELLS[0] % CELLS[1], cell / (CELLS[0] * CELLS[1])]))

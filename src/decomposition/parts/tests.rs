@@ -1,18 +1,18 @@
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::super::number_bodies;
 use super::*;
 use crate::comm::solo::Solo;
 use crate::element::Kind;
 use crate::mesh::Brick;
+use crate::mesh::faces::Neighbours;
 
 #[test]
 fn parts_are_balanced_and_more_compact_than_those_of_metis_with_as_few_shared_nodes() {
     let brick = Brick { origin: [0.0; 3], size: [3.0, 1.0, 1.0], cells: [24, 8, 8] };
     for (kind, wanted) in [(Kind::Tet4, 24), (Kind::Tet4, 60), (Kind::Hex8, 24)] {
         let bodies = number_bodies([(kind, Shape::Brick(brick), vec![0])]);
-        let torn = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
-        let Cut { portion, sizes, .. } = Cut::new(Dealt::new(&torn, 0, &Solo), vec![wanted], &[], &Solo);
+        let Cut { portion, sizes, .. } = Cut::new(Dealt::new(&bodies[0], None, &Solo), vec![wanted], &[], &Solo);
         assert_eq!(sizes.len(), wanted as usize);
         let mean = portion.len() as f64 / f64::from(wanted);
         assert!(sizes.iter().all(|&size| (size as f64 / mean - 1.0).abs() < 0.25), "{sizes:?} around {mean}");

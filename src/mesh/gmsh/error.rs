@@ -11,6 +11,14 @@ pub enum Problem {
     /// The system refuses to open or read it.
     #[error("cannot read the mesh file: {0}")]
     Read(#[from] io::Error),
+    /// What another rank met, or all of them.
+    #[error("{text}")]
+    Told {
+        /// What it says.
+        text: String,
+        /// Whether the system refuses to open or read the file.
+        is_unreadable: bool,
+    },
     /// Another kind of file.
     #[error(
         "this is not a Gmsh mesh, which begins with $MeshFormat; `gmsh -3 -format msh41 PART.geo -o PART.msh` makes one"
@@ -302,9 +310,15 @@ impl fmt::Display for Place {
 }
 
 impl Problem {
+    /// Whether the system refuses to open or read the file.
+    pub fn is_unreadable(&self) -> bool {
+        matches!(self, Self::Read(_) | Self::Told { is_unreadable: true, .. })
+    }
+
     /// Something else than the format prescribes, shown by its beginning.
     pub(super) fn expected(place: Place, expected: &'static str, found: &[u8]) -> Self {
-        let found = String::from_utf8_lossy(&found[..found.len().min(64)]).into_owned();
+        // Texts between ranks end where a NUL is.
+        let found = String::from_utf8_lossy(&found[..found.len().min(64)]).replace('\0', "\u{fffd}");
         Self::Expected { place, expected, found }
     }
 }

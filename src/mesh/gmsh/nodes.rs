@@ -14,7 +14,7 @@ pub(super) enum NodeTags {
 
 impl NodeTags {
     /// # Errors
-    /// If a number is there twice, or there are more than 32 bits can count.
+    /// If a number is there twice (the least of these), or there are more than 32 bits can count.
     pub fn new(tags: &[u64]) -> Result<Self, Problem> {
         if tags.len() >= u32::MAX as usize {
             let limit = format!("{} are not read", u32::MAX);
@@ -27,7 +27,7 @@ impl NodeTags {
             let mut index = vec![u32::MAX; (greatest - least) as usize + 1];
             for (k, tag) in numbered {
                 if std::mem::replace(&mut index[(tag - least) as usize], k as u32) != u32::MAX {
-                    twice = Some(*tag);
+                    twice = Some(twice.map_or(*tag, |least: u64| least.min(*tag)));
                 }
             }
             Self::Dense { least, index }
@@ -35,7 +35,7 @@ impl NodeTags {
             let mut index = HashMap::with_capacity(tags.len());
             for (k, tag) in numbered {
                 if index.insert(*tag, k as u32).is_some() {
-                    twice = Some(*tag);
+                    twice = Some(twice.map_or(*tag, |least: u64| least.min(*tag)));
                 }
             }
             Self::Sparse(index)

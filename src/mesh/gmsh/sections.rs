@@ -10,6 +10,53 @@ use super::source::Source;
 /// Physical groups of each surface and volume, by dimension and tag.
 pub(super) type Entities = HashMap<(i32, i32), Vec<i32>>;
 
+/// A section that is read in one of several ways.
+pub(super) enum Section<'a> {
+    Nodes,
+    /// After the nodes.
+    Elements(&'a Entities),
+}
+
+/// Reads a file behind its header, with what reads nodes and elements to their ends. Names of physical groups.
+pub(super) fn sections<R: BufRead>(
+    source: &mut Source<R>,
+    version: u8,
+    mut read: impl FnMut(&mut Source<R>, Section) -> Result<(), Problem>,
+) -> Result<Vec<GroupName>, Problem> {
+    let (mut names, mut entities) = (Vec::new(), Entities::new());
+    let (mut has_nodes, mut has_elements) = (false, false);
+    while let Some((place, line)) = source.filled_line()? {
+        match &line[..] {
+            b"$PhysicalNames" => names = physical_names(source)?,
+            b"$Entities" if version == 4 => entities = self::entities(source)?,
+            b"$PartitionedEntities" => return Err(Problem::Partitioned),
+            b"$Nodes" => {
+                read(source, Section::Nodes)?;
+                has_nodes = true;
+            }
+            b"$Elements" if !has_nodes => {
+                return Err(Problem::NoSection("Nodes", "it must come before $Elements"));
+            }
+            b"$Elements" => {
+                read(source, Section::Elements(&entities))?;
+                has_elements = true;
+            }
+            [b'$', name @ ..] if !name.starts_with(b"End") => {
+                let name = String::from_utf8_lossy(name).into_owned();
+                if !source.skip_to(&format!("$End{name}"))? {
+                    return Err(Problem::NoEnd { place, name });
+                }
+            }
+            other => return Err(Problem::expected(place, "the beginning of a section, as $Nodes", other)),
+        }
+    }
+    match (has_nodes, has_elements) {
+        (false, _) => Err(Problem::NoSection("Nodes", "save the mesh again")),
+        (_, false) => Err(Problem::NoSection("Elements", "save the mesh again")),
+        _ => Ok(names),
+    }
+}
+
 /// `$MeshFormat`, to its end. The version of the rest of the file: 4 for 4.1, 2 for 2.2.
 pub(super) fn header(source: &mut Source<impl BufRead>) -> Result<u8, Problem> {
     let first = source.filled_line()?;

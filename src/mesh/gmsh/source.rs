@@ -1,6 +1,6 @@
 //! Numbers and lines of a mesh file, text or binary, and where they are. Nothing is read twice and nothing is kept.
 
-use std::io::{self, BufRead};
+use std::io::{self, BufRead, Seek};
 
 use super::error::{Place, Problem};
 
@@ -17,7 +17,8 @@ pub(super) struct Source<R> {
     /// Whether numbers are binary.
     pub binary: bool,
     line: u64,
-    byte: u64,
+    /// Bytes that were read.
+    pub byte: u64,
     token: Vec<u8>,
     item: Item,
 }
@@ -195,5 +196,24 @@ impl<R: BufRead> Source<R> {
         }
         let number = std::str::from_utf8(&self.token).ok().and_then(|word| word.parse().ok());
         number.ok_or_else(|| Problem::expected(self.place(), expected, &self.token))
+    }
+}
+
+impl<R: BufRead + Seek> Source<R> {
+    /// Goes past so many items of so many bytes each, which count as read if they are those announced.
+    ///
+    /// # Errors
+    /// If the file ends before.
+    pub fn pass(&mut self, items: u64, bytes: u64, are_announced: bool) -> Result<()> {
+        let there = self.length.saturating_sub(self.byte) / bytes;
+        if are_announced {
+            self.item.done += items.min(there);
+        }
+        if there < items {
+            return Err(self.cut_short());
+        }
+        self.input.seek_relative((items * bytes) as i64)?;
+        self.byte += items * bytes;
+        Ok(())
     }
 }

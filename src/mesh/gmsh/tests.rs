@@ -1,6 +1,7 @@
 //! Files that Gmsh wrote (tests/meshes/make.py), and what becomes of them when they are damaged.
 
 use super::*;
+use crate::comm::solo::Solo;
 use crate::decomposition::{BodyMesh, Shape, number_bodies};
 use crate::element::tet4::Tet4;
 use crate::element::{Element, Kind};
@@ -20,14 +21,19 @@ fn parse(bytes: &[u8]) -> Result<Msh, Problem> {
 }
 
 fn volume(mesh: &SolidMesh) -> f64 {
-    let place = |tet: &[u32; 4]| tet.map(|n| mesh.points[n as usize]);
-    mesh.elements.of().iter().map(|tet| Tet4::points(&place(tet)).expect("elements are checked")[0].weight).sum()
+    let place = |tet: &[u32; 4]| tet.map(|n| mesh.portion.points[n as usize]);
+    mesh.portion
+        .elements
+        .of()
+        .iter()
+        .map(|tet| Tet4::points(&place(tet)).expect("elements are checked")[0].weight)
+        .sum()
 }
 
 /// Area times normal of a surface, and the number of its triangles.
 fn area(mesh: &SolidMesh, surface: usize) -> ([f64; 3], usize) {
     let faces = &mesh.surfaces[surface].faces;
-    let place = |face: &Vec<u32>| std::array::from_fn(|k| mesh.points[face[k] as usize]);
+    let place = |face: &Vec<u32>| std::array::from_fn(|k| mesh.portion.points[face[k] as usize]);
     let vectors = faces.iter().map(|face| area_vector(&place(face)));
     (vectors.fold([0.0; 3], |sum, v| std::array::from_fn(|a| sum[a] + v[a])), faces.len())
 }
@@ -42,10 +48,10 @@ fn assert_area(found: ([f64; 3], usize), area: [f64; 3], triangles: usize) {
 #[track_caller]
 fn assert_same(found: &[SolidMesh], expected: &[SolidMesh]) {
     for (found, expected) in found.iter().zip(expected) {
-        assert!((&found.elements, &found.surfaces) == (&expected.elements, &expected.surfaces));
-        let pairs = found.points.as_flattened().iter().zip(expected.points.as_flattened());
+        assert!((&found.portion.elements, &found.surfaces) == (&expected.portion.elements, &expected.surfaces));
+        let pairs = found.portion.points.as_flattened().iter().zip(expected.portion.points.as_flattened());
         assert!(
-            found.points.len() == expected.points.len()
+            found.portion.points.len() == expected.portion.points.len()
                 && pairs.fold(0.0_f64, |d, (a, b)| d.max((a - b).abs())) < 1e-15
         );
     }
@@ -55,11 +61,11 @@ fn assert_same(found: &[SolidMesh], expected: &[SolidMesh]) {
 fn every_format_gives_the_same_bodies() {
     let of = |bytes: &[u8]| {
         let msh = parse(bytes).unwrap();
-        let block = msh.body(&["block"], &["base", "both sides", "top"], Kind::Tet4).unwrap();
-        (block, msh.body(&["the rod"], &["both sides", "9"], Kind::Tet4).unwrap())
+        let block = msh.body(&Solo, &["block"], &["base", "both sides", "top"], Kind::Tet4).unwrap();
+        (block, msh.body(&Solo, &["the rod"], &["both sides", "9"], Kind::Tet4).unwrap())
     };
     let (block, rod) = of(TEXT);
-    assert_eq!((block.cells, rod.cells, rod.elements.len()), (90, 42, 42));
+    assert_eq!((block.counts.cells, rod.counts.cells, rod.portion.len()), (90, 42, 42));
     assert!((volume(&block) - 2.0).abs() < 1e-13 && (volume(&rod) - 0.25).abs() < 1e-13);
     assert_area(area(&block, 0), [0.0, 0.0, -2.0], 14);
     assert_area(area(&block, 1), [0.0, 0.0, 2.0], 14);
@@ -72,19 +78,21 @@ fn every_format_gives_the_same_bodies() {
     // Version 2 orders nodes and cells in its own way.
     let (block_2, rod_2) = of(TEXT_2);
     assert_same(&[of(BINARY_2).0, of(BINARY_2).1], &[block_2.clone(), rod_2.clone()]);
-    assert_eq!((block_2.elements.len(), rod_2.elements.len()), (90, 42));
+    assert_eq!((block_2.portion.len(), rod_2.portion.len()), (90, 42));
     assert!((volume(&block_2) - 2.0).abs() < 1e-13);
     assert_area(area(&block_2, 1), [0.0, 0.0, 2.0], 14);
 }
 
 #[test]
 fn hexahedra_and_prisms_are_split_alike_on_both_sides_of_their_faces() {
-    let mesh = parse(HEXAHEDRA).unwrap().body(&[], &["base", "top"], Kind::Tet4).unwrap();
-    assert_eq!((mesh.cells, mesh.elements.len()), (81, 27 * 6 + 54 * 3));
+    let mesh = parse(HEXAHEDRA).unwrap().body(&Solo, &[], &["base", "top"], Kind::Tet4).unwrap();
+    assert_eq!((mesh.counts.cells, mesh.portion.elements.len()), (81, 27 * 6 + 54 * 3));
     assert!((volume(&mesh) - 2.0).abs() < 1e-13);
     assert_area(area(&mesh, 0), [0.0, 0.0, -2.0], 18 + 18);
     assert_area(area(&mesh, 1), [0.0, 0.0, 2.0], 18 + 18);
-    let outer = crate::mesh::faces::Neighbours::new(mesh.points.len(), &mesh.elements).outer(&mesh.elements).count();
+    let outer = crate::mesh::faces::Neighbours::new(mesh.portion.points.len(), &mesh.portion.elements)
+        .outer(&mesh.portion.elements)
+        .count();
     // Quadrangles: 9 at the end of the hexahedra, 9 at that of the prisms, 18 on each long side.
     assert_eq!(outer, 2 * (9 + 9 + 2 * 18) + 2 * 36);
 }
@@ -96,7 +104,7 @@ fn damaged(from: &str, to: &str) -> String {
     assert!(text.contains(from), "`{from}` is not in the file");
     let text = text.replacen(from, to, 1);
     let msh = Msh::parse(text.as_bytes(), text.len() as u64);
-    let used = msh.and_then(|msh| msh.body(&["block"], &["base"], Kind::Tet4));
+    let used = msh.and_then(|msh| msh.body(&Solo, &["block"], &["base"], Kind::Tet4));
     let message = used.expect_err("should be refused").to_string();
     assert!(!message.contains('\n'), "one paragraph: {message}");
     message
@@ -141,7 +149,7 @@ fn missing_sections_are_named() {
     };
     assert_says(&cut("$Nodes", "$EndNodes\n").unwrap_err().to_string(), &["no section $Nodes"]);
     assert_says(&cut("$Elements", "$EndElements\n").unwrap_err().to_string(), &["no section $Elements"]);
-    let untagged = cut("$Entities", "$EndEntities\n").unwrap().body(&["block"], &[], Kind::Tet4);
+    let untagged = cut("$Entities", "$EndEntities\n").unwrap().body(&Solo, &["block"], &[], Kind::Tet4);
     assert_says(&untagged.unwrap_err().to_string(), &["132 of 132 volume cells", "{1, 2}"]);
 }
 
@@ -169,7 +177,7 @@ fn damaged_bytes_are_refused_or_read_but_never_take_memory_or_panic() {
                 damaged[place] = (random.number().abs() * 256.0) as u8;
             }
             if let Ok(msh) = parse(&damaged) {
-                let _ = msh.body(&["block"], &["base", "top"], Kind::Tet4);
+                let _ = msh.body(&Solo, &["block"], &["base", "top"], Kind::Tet4);
             }
         }
     }
@@ -205,7 +213,8 @@ const LOWER: &str = "4 2 2 2 1 3 2 5";
 #[track_caller]
 fn assert_refused(elements: &[&str], volume: Option<&str>, surface: &str, parts: &[&str]) {
     let msh = version_2(&NAMES, &NODES, elements).unwrap();
-    let problem = msh.body(volume.as_slice(), &[surface], Kind::Tet4).expect_err("should be refused").to_string();
+    let problem =
+        msh.body(&Solo, volume.as_slice(), &[surface], Kind::Tet4).expect_err("should be refused").to_string();
     assert_says(&problem, parts);
     assert!(!problem.contains('\n'), "one paragraph: {problem}");
 }
@@ -213,23 +222,23 @@ fn assert_refused(elements: &[&str], volume: Option<&str>, surface: &str, parts:
 #[test]
 fn a_surface_between_two_volumes_belongs_to_both_with_either_sense() {
     let msh = version_2(&NAMES, &NODES, &[UPPER, LOWER, "2 2 1 7 1 2 3", "2 2 1 7 1 2 3"]).unwrap();
-    let mut up = msh.body(&["upper"], &["middle"], Kind::Tet4).unwrap();
-    let mut down = msh.body(&["lower"], &["middle"], Kind::Tet4).unwrap();
+    let mut up = msh.body(&Solo, &["upper"], &["middle"], Kind::Tet4).unwrap();
+    let mut down = msh.body(&Solo, &["lower"], &["middle"], Kind::Tet4).unwrap();
     assert_area(area(&up, 0), [0.0, 0.0, -0.5], 1);
     assert_area(area(&down, 0), [0.0, 0.0, 0.5], 1);
     (up.surfaces, down.surfaces) = (Vec::new(), Vec::new());
-    assert_eq!((up.points.len(), down.points[3]), (4, NODES[4]));
+    assert_eq!((up.portion.points.len(), down.portion.points[3]), (4, NODES[4]));
 }
 
 #[test]
 fn several_volumes_are_the_regions_of_one_body() {
     let msh = version_2(&NAMES, &NODES, &[LOWER, UPPER, "2 2 2 8 1 2 4", "2 2 1 7 1 2 3"]).unwrap();
-    let body = |volumes: &[&str], surface: &str| msh.body(volumes, &[surface], Kind::Tet4);
+    let body = |volumes: &[&str], surface: &str| msh.body(&Solo, volumes, &[surface], Kind::Tet4);
     let mesh = body(&["upper", "lower"], "side").unwrap();
-    assert_eq!((mesh.points.len(), mesh.elements.len(), &mesh.regions[..]), (5, 2, &[1, 0][..]));
-    assert_eq!(body(&["lower", "upper"], "side").unwrap().regions, [0, 1]);
+    assert_eq!((mesh.portion.points.len(), mesh.portion.elements.len(), &mesh.portion.wholes[..]), (5, 2, &[1, 0][..]));
+    assert_eq!(body(&["lower", "upper"], "side").unwrap().portion.wholes, [0, 1]);
     let alone = body(&["upper"], "side").unwrap();
-    assert!(alone.regions.is_empty() && alone.region(0) == 0);
+    assert_eq!(alone.portion.wholes, [0]);
     // What is a boundary of each volume is none of both.
     let inner = body(&["upper", "lower"], "middle").unwrap_err().to_string();
     assert_says(&inner, &["1 of 1 triangles", "`middle`", "inside volume `upper` + `lower`"]);
@@ -241,14 +250,14 @@ fn several_volumes_are_the_regions_of_one_body() {
 fn volumes_that_make_no_body_are_refused() {
     // These have an edge in common, and go through each other.
     let msh = version_2(&NAMES, &NODES, &[UPPER, "4 2 2 2 1 5 3 6"]).unwrap();
-    let torn = msh.body(&["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
+    let torn = msh.body(&Solo, &["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
     let parts = ["volumes `upper` and `lower`, first near (", "torn", "cross", "BooleanFragments", "with a contact"];
     assert_says(&torn, &parts);
     let mut msh = version_2(&NAMES, &NODES, &[UPPER, LOWER]).unwrap();
     msh.blocks[1].groups.push(1);
-    let shared = msh.body(&["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
+    let shared = msh.body(&Solo, &["upper", "lower"], &[], Kind::Tet4).unwrap_err().to_string();
     assert_says(&shared, &["`upper` and `lower` share 1 cells", "Gmsh's volume 2", "take that volume out"]);
-    assert_eq!(msh.body(&["upper"], &[], Kind::Tet4).unwrap().elements.len(), 2);
+    assert_eq!(msh.body(&Solo, &["upper"], &[], Kind::Tet4).unwrap().portion.len(), 2);
 }
 
 #[test]
@@ -336,14 +345,14 @@ fn file_of(kind: Kind) -> (Vec<u8>, BodyMesh) {
 fn hexahedra_and_quadratic_tetrahedra_are_kept_for_the_elements_that_are_made_of_them() {
     for kind in [Kind::Hex8, Kind::Tet10] {
         let (text, body) = file_of(kind);
-        let mesh = parse(&text).unwrap().body(&[], &["top"], kind).unwrap();
-        assert_eq!(mesh.elements.kind(), kind);
+        let mesh = parse(&text).unwrap().body(&Solo, &[], &["top"], kind).unwrap();
+        assert_eq!(mesh.portion.elements.kind(), kind);
         let expected: Vec<u32> =
             (0..body.counts().elements).flat_map(|e| body.element(e)).map(|node| node as u32).collect();
-        assert_eq!(mesh.elements.nodes(), expected);
+        assert_eq!(mesh.portion.elements.nodes(), expected);
         let mut sum = [0.0; 3];
         for face in mesh.surface("top") {
-            let places: Vec<_> = face.iter().map(|&n| mesh.points[n as usize]).collect();
+            let places: Vec<_> = face.iter().map(|&n| mesh.portion.points[n as usize]).collect();
             crate::mesh::surface::shares(&places).iter().for_each(|s| (0..3).for_each(|i| sum[i] += s[i]));
         }
         assert!(sum[0].abs() + sum[1].abs() + (sum[2] - 6.0).abs() < 1e-13, "{kind:?}: {sum:?}");
@@ -352,7 +361,9 @@ fn hexahedra_and_quadratic_tetrahedra_are_kept_for_the_elements_that_are_made_of
 
 #[test]
 fn other_cells_are_refused_for_them() {
-    let of = |text: &[u8], kind| parse(text).unwrap().body(&[], &[], kind).expect_err("should be refused").to_string();
+    let of = |text: &[u8], kind| {
+        parse(text).unwrap().body(&Solo, &[], &[], kind).expect_err("should be refused").to_string()
+    };
     let (hexahedra, quadratic) = (file_of(Kind::Hex8).0, file_of(Kind::Tet10).0);
     let assert_says = |text: String, parts: &[&str]| {
         parts.iter().for_each(|part| assert!(text.contains(part), "`{part}` is not in: {text}"));

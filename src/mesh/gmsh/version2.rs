@@ -68,7 +68,7 @@ pub(super) fn elements(source: &mut Source<impl BufRead>, tags: &NodeTags) -> Re
             let groups: &[i32] = if group == 0 { &[] } else { &[group] };
             let fits = |b: &&mut Block| b.kind == kind && b.entity == entity && b.groups == groups;
             if blocks.last_mut().as_ref().filter(|b| fits(b)).is_none() {
-                blocks.push(Block { kind, entity, groups: groups.to_vec(), cells: 0, nodes: Vec::new() });
+                blocks.push(Block { kind, entity, groups: groups.to_vec(), cells: 0, first: 0, nodes: Vec::new() });
             }
             let block = blocks.last_mut().expect("one was pushed");
             block.cells += 1;

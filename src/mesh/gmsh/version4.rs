@@ -10,7 +10,7 @@ use super::sections::Entities;
 use super::source::Source;
 
 /// Number of blocks and of items in all of them; the least and greatest number follow and are not needed.
-fn counts(source: &mut Source<impl BufRead>, section: &'static str) -> Result<(u64, u64), Problem> {
+pub(super) fn counts(source: &mut Source<impl BufRead>, section: &'static str) -> Result<(u64, u64), Problem> {
     source.announce(section, "counts", 4, 1)?;
     let counts = (source.size("a number of blocks")?, source.size("a number of items")?);
     source.size("the least number")?;
@@ -64,34 +64,48 @@ pub(super) fn elements(
     let (blocks, announced) = counts(source, "Elements")?;
     source.announce("Elements", "elements", announced, 4)?;
     let mut result = Vec::new();
-    let mut found = 0_u64;
+    let mut found = 0;
     for _ in 0..blocks {
-        let dimension = source.int("the dimension of an entity")?;
-        let entity = source.int("the tag of an entity")?;
-        let place = source.place();
-        let number = source.int("the type of cells")?;
-        let kind = Kind::of(number).ok_or(Problem::UnknownKind(place, number))?;
-        let cells = source.size("a number of cells")?;
-        found = found.saturating_add(cells);
-        if found > announced {
-            return Err(Problem::Count { section: "Elements", items: "elements", announced, found });
-        }
-        let groups = entities.get(&(dimension, entity)).cloned().unwrap_or_default();
-        let mut block = Block { kind, entity, groups, cells, nodes: Vec::new() };
-        for _ in 0..cells {
+        let mut block = block(source, entities, (&mut found, announced))?;
+        for _ in 0..block.cells {
             source.size("the number of a cell")?;
-            for _ in 0..kind.nodes {
+            for _ in 0..block.kind.nodes {
                 block.add_node(source.place(), source.size("the number of a node")?, tags)?;
             }
             source.done();
         }
-        if kind.dimension >= 2 {
+        if block.kind.dimension >= 2 {
             result.push(block);
         }
     }
+    all_found(source, found, announced)?;
+    Ok(result)
+}
+
+/// The header of a block of cells; counts these.
+pub(super) fn block(
+    source: &mut Source<impl BufRead>,
+    entities: &Entities,
+    (found, announced): (&mut u64, u64),
+) -> Result<Block, Problem> {
+    let dimension = source.int("the dimension of an entity")?;
+    let entity = source.int("the tag of an entity")?;
+    let place = source.place();
+    let number = source.int("the type of cells")?;
+    let kind = Kind::of(number).ok_or(Problem::UnknownKind(place, number))?;
+    let cells = source.size("a number of cells")?;
+    *found = found.saturating_add(cells);
+    if *found > announced {
+        return Err(Problem::Count { section: "Elements", items: "elements", announced, found: *found });
+    }
+    let groups = entities.get(&(dimension, entity)).cloned().unwrap_or_default();
+    Ok(Block { kind, entity, groups, cells, first: 0, nodes: Vec::new() })
+}
+
+/// The end of `$Elements`, if as many cells were found as announced.
+pub(super) fn all_found(source: &mut Source<impl BufRead>, found: u64, announced: u64) -> Result<(), Problem> {
     if found != announced {
         return Err(Problem::Count { section: "Elements", items: "elements", announced, found });
     }
-    source.end("$EndElements")?;
-    Ok(result)
+    source.end("$EndElements")
 }

@@ -4,23 +4,29 @@ use std::collections::BTreeSet;
 
 use super::error::Problem;
 use super::groups::{higher_order, listed};
+use super::numbers::Numbers;
 use super::surface::Boundary;
 use super::{Block, Msh};
+use crate::comm::Comm;
+use crate::comm::words::{least, sum};
 use crate::element::Kind;
-use crate::mesh::faces::Neighbours;
+use crate::mesh::joints::Joints;
+use crate::mesh::portion::Portion;
 use crate::mesh::quality::Quality;
+use crate::mesh::solid::Counts;
 use crate::mesh::whole::{self, Found};
 use crate::mesh::{Elements, SolidMesh, split};
 
 impl Msh {
     /// The physical volumes of these names (or numbers, if they have no name), or the only one there is, with these
     /// surfaces, as elements of a kind: cells are split into linear tetrahedra, and for others they must be what the kind
-    /// is. Each volume is a region; elements come in the order of the file.
+    /// is. Each volume is a region; elements and nodes are numbered in the order of the file. Each rank gets a piece of a
+    /// space-filling curve. Collective.
     ///
     /// # Errors
     /// If a volume or one of the surfaces is missing, volumes have a cell in common, elements cannot be computed with, or
-    /// the mesh only looks whole.
-    pub fn body(&self, volumes: &[&str], surfaces: &[&str], kind: Kind) -> Result<SolidMesh, Problem> {
+    /// the mesh only looks whole; the same on every rank.
+    pub fn body(&self, comm: &dyn Comm, volumes: &[&str], surfaces: &[&str], kind: Kind) -> Result<SolidMesh, Problem> {
         self.refuse_untagged()?;
         let volumes = self.choose(volumes)?;
         for volume in &volumes {
@@ -28,47 +34,61 @@ impl Msh {
         }
         let blocks = self.blocks_of(&volumes)?;
         let volume = &volumes.join("` + `");
-        self.refuse_repeated(&volumes, &blocks)?;
-
-        let mut index = vec![u32::MAX; self.points.len()];
-        blocks.iter().flat_map(|(b, _)| &b.nodes).for_each(|&n| index[n as usize] = 0);
-        let mut points = Vec::new();
-        for (index, point) in index.iter_mut().zip(&self.points).filter(|(index, _)| **index == 0) {
-            *index = points.len() as u32;
-            points.push(*point);
+        self.refuse_repeated(comm, &volumes, &blocks)?;
+        let elements = blocks.iter().map(|(block, _)| per_cell(block, kind) * block.cells).sum();
+        let most = (MOST_FACES / kind.faces().len()) as u64;
+        if elements >= most {
+            let limit = format!("the {most} whose faces can be counted");
+            return Err(Problem::TooMany { section: "Elements", items: "elements", announced: elements, limit });
         }
-        let (mut nodes, mut regions, gmsh) = (Vec::new(), Vec::new(), kind.gmsh());
+        let (portion, numbers) = self.portion(comm, &blocks, kind);
+        check_elements(volume, Quality::of(comm, &portion))?;
+        let portion = portion.along_curve(comm, elements);
+        let joints = Joints::new(comm, &portion);
+        if let Some((faces, node)) = joints.overlapping {
+            let own = portion.nodes.binary_search(&node).ok();
+            let point = least(comm, own.map(|k| portion.points[k].map(f64::to_bits)));
+            let near = point.expect("some rank has the node").map(f64::from_bits);
+            return Err(Problem::Overlapping { volume: volume.clone(), faces, near });
+        }
+        let (pieces, piece_count) =
+            whole::pieces(comm, &portion, &joints).map_err(|found| not_whole(&volumes, found))?;
+        let boundary = Boundary { comm, msh: self, volume, portion: &portion, joints: &joints, numbers: &numbers };
+        let surfaces = boundary.surfaces(surfaces)?;
+        let cells = blocks.iter().map(|(b, _)| b.cells).sum();
+        let counts = Counts { nodes: numbers.total, cells, elements };
+        Ok(SolidMesh { portion, pieces, surfaces, piece_count, counts })
+    }
+
+    /// The elements in this rank's share of the cells. Collective.
+    fn portion<'a>(&'a self, comm: &'a dyn Comm, blocks: &[(&Block, usize)], kind: Kind) -> (Portion, Numbers<'a>) {
+        let (mut of_elements, mut wholes, gmsh) = (Vec::new(), Vec::new(), kind.gmsh());
+        let (mut first, mut before) = (None, 0);
         // Both sides of a face are cut alike because nodes keep their order.
-        for (block, region) in &blocks {
-            for cell in block.nodes.chunks_exact(block.kind.nodes) {
+        for (block, region) in blocks {
+            if !block.nodes.is_empty() {
+                first.get_or_insert(before + per_cell(block, kind) * block.first);
+            }
+            before += per_cell(block, kind) * block.cells;
+            for cell in block.own() {
                 match gmsh.is_split() {
-                    true => split::tetrahedra(cell, |tet| nodes.extend(tet.map(|n| index[n as usize]))),
-                    false => nodes.extend(gmsh.order.iter().map(|&k| index[cell[k] as usize])),
+                    true => split::tetrahedra(cell, |tet| of_elements.extend(tet)),
+                    false => of_elements.extend(gmsh.order.iter().map(|&k| cell[k])),
                 }
             }
-            if volumes.len() > 1 {
-                regions.resize(nodes.len() / kind.nodes(), *region as u32);
-            }
+            wholes.resize(of_elements.len() / kind.nodes(), *region as u32);
         }
-        let elements = Elements::new(kind, nodes);
-        let most = MOST_FACES / kind.faces().len();
-        if elements.len() >= most {
-            let limit = format!("the {most} whose faces can be counted");
-            let announced = elements.len() as u64;
-            return Err(Problem::TooMany { section: "Elements", items: "elements", announced, limit });
-        }
-        let cells = blocks.iter().map(|(b, _)| b.cells).sum();
-        let mut mesh = SolidMesh { points, elements, cells, surfaces: Vec::new(), regions, pieces: Vec::new() };
-        check_elements(volume, &mesh)?;
-        let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
-        if let Some(node) = neighbours.overlaps_at {
-            let (volume, faces, near) = (volume.clone(), neighbours.overlapping, mesh.points[node as usize]);
-            return Err(Problem::Overlapping { volume, faces, near });
-        }
-        mesh.pieces = whole::pieces(&mesh, &neighbours).map_err(|found| not_whole(&volumes, found))?;
-        mesh.surfaces =
-            Boundary { msh: self, volume, mesh: &mesh, neighbours: &neighbours, index: &index }.surfaces(surfaces)?;
-        Ok(mesh)
+        let mut used = of_elements.clone();
+        used.sort_unstable();
+        used.dedup();
+        let numbers = Numbers::new(comm, self, &used);
+        let (nodes, points) = numbers.of(&used);
+        let local = |node: &u32| used.binary_search(node).expect("every node is listed") as u32;
+        of_elements.iter_mut().for_each(|node| *node = local(node));
+        let first = first.unwrap_or_default() as u32;
+        let (elements, part) = (Elements::new(kind, of_elements), vec![0; wholes.len()]);
+        let own = (first..).take(elements.len()).collect();
+        (Portion { numbers: own, elements, wholes, part, nodes, points }, numbers)
     }
 
     /// Blocks of physical volumes, each with the index of its volume.
@@ -87,18 +107,20 @@ impl Msh {
     }
 
     /// Refuses cells that have a node twice.
-    fn refuse_repeated(&self, volumes: &[String], blocks: &[(&Block, usize)]) -> Result<(), Problem> {
+    fn refuse_repeated(&self, comm: &dyn Comm, volumes: &[String], blocks: &[(&Block, usize)]) -> Result<(), Problem> {
         let (mut count, mut first) = (0, None);
-        for (block, volume) in blocks {
-            for cell in block.nodes.chunks_exact(block.kind.nodes) {
-                if let Some(&node) = (1..cell.len()).find(|&k| cell[..k].contains(&cell[k])).map(|k| &cell[k]) {
+        for (k, (block, _)) in (0..).zip(blocks) {
+            for (cell, nodes) in (block.first..).zip(block.own()) {
+                if let Some(&node) = (1..nodes.len()).find(|&k| nodes[..k].contains(&nodes[k])).map(|k| &nodes[k]) {
                     count += 1;
-                    first.get_or_insert((block.kind.name, volumes[*volume].clone(), self.points[node as usize]));
+                    first.get_or_insert([k, cell, node.into()]);
                 }
             }
         }
-        let refused = |(kind, volume, near)| Err(Problem::Repeated { volume, cells: count, kind, near });
-        first.map_or(Ok(()), refused)
+        let Some([block, _, node]) = least(comm, first) else { return Ok(()) };
+        let (block, volume) = blocks[block as usize];
+        let (cells, near) = (sum(comm, vec![count])[0], self.point(comm, node));
+        Err(Problem::Repeated { volume: volumes[volume].clone(), cells, kind: block.kind.name, near })
     }
 
     fn refuse_untagged(&self) -> Result<(), Problem> {
@@ -132,9 +154,14 @@ impl Msh {
     }
 }
 
+/// Elements that a cell becomes.
+fn per_cell(block: &Block, kind: Kind) -> u64 {
+    if kind.gmsh().is_split() { split::tetrahedra_of(block.kind.nodes) } else { 1 }
+}
+
 /// Refuses elements without a positive volume.
-fn check_elements(volume: &str, mesh: &SolidMesh) -> Result<(), Problem> {
-    let Quality { elements, inverted, degenerate, first, .. } = Quality::of(mesh);
+fn check_elements(volume: &str, quality: Quality) -> Result<(), Problem> {
+    let Quality { elements, inverted, degenerate, first, .. } = quality;
     let Some(near) = first else { return Ok(()) };
     let hint = if inverted == elements { ", or turn all cells inside out" } else { "" };
     Err(Problem::BadElements { volume: volume.to_owned(), elements, inverted, degenerate, near, hint })

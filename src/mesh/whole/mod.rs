@@ -11,20 +11,26 @@
 //! holes of the shape of a tetrahedron, quadratic elements can share corners but not middles, and pieces can hang together by
 //! nodes without a face. Several pieces that do not touch are sound, unless one is inside of another.
 
+//!
+//! Each rank has some of the elements, looks at these, and at what others have beside them. All hear the same of what was found.
+//! What shows first belongs to the mesh: it is that of the least elements.
+
 mod facet;
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, HashSet};
 
 use thiserror::Error;
 
-use super::SolidMesh;
 use super::boxes::{Box3, BoxTree, around};
-use super::connectivity::split_into_pieces;
-use super::faces::{Neighbours, OUTSIDE};
+use super::faces::OUTSIDE;
+use super::joints::Joints;
 use super::near::{of_points, pierces, to_triangle, volume};
+use super::portion::Portion;
+use crate::comm::words::{least, sum};
+use crate::comm::{Comm, all_gather_u64};
 
 pub use facet::NEAR;
-use facet::{Facet, facets, hole_between, sorted};
+use facet::{Facet, facets, hole_between, sorted, with_others};
 
 /// Why a mesh only looks whole, with what to do about it in Gmsh.
 #[derive(Debug, Error, PartialEq)]
@@ -91,173 +97,248 @@ pub struct Found {
     pub regions: [usize; 2],
 }
 
-/// The face-connected piece of each element, numbered by their first elements; nothing if there is only one.
+/// Where a flaw shows: what orders it, then the place, then the regions of two elements.
+type Site = [u64; 7];
+
+fn site(order: [u64; 2], near: [f64; 3], regions: [u32; 2]) -> Site {
+    let [x, y, z] = near.map(f64::to_bits);
+    [order[0], order[1], x, y, z, regions[0].into(), regions[1].into()]
+}
+
+/// The flaw, if it was found somewhere.
+fn found(flaw: Flaw, first: Option<Site>) -> Result<(), Found> {
+    let Some([_, _, x, y, z, one, other]) = first else { return Ok(()) };
+    Err(Found { flaw, near: [x, y, z].map(f64::from_bits), regions: [one as usize, other as usize] })
+}
+
+/// The face-connected piece of each own element, numbered by their first elements, and how many there are. Collective.
 ///
 /// # Errors
 /// If the mesh only looks whole.
-pub fn pieces(mesh: &SolidMesh, neighbours: &Neighbours) -> Result<Vec<u32>, Found> {
-    middles(mesh, neighbours)?;
-    let mut pieces = vec![0; mesh.elements.len()];
-    let count = split_into_pieces(&mut pieces, |element| neighbours.of(element));
-    let pieces = if count > 1 { pieces.into_iter().map(|piece| piece as u32).collect() } else { Vec::new() };
-    let facets = facets(mesh, neighbours);
+pub fn pieces(comm: &dyn Comm, portion: &Portion, joints: &Joints) -> Result<(Vec<u32>, usize), Found> {
+    middles(comm, portion, joints)?;
+    let (pieces, count) = joints.pieces(comm, portion, &vec![0; portion.len()]);
+    let facets = with_others(comm, facets(comm, portion, joints));
     let boxes: Vec<Box3> = facets.iter().map(Facet::room).collect();
     let tree = BoxTree::new(&boxes);
-    apart(mesh, &facets, &tree)?;
-    hinges(mesh, &pieces)?;
-    inside(mesh, &facets, &tree, &pieces, count)?;
-    Ok(pieces)
+    apart(comm, portion, &facets, &tree)?;
+    if count > 1 {
+        hinges(comm, portion, joints, &pieces)?;
+        inside(comm, portion, (&facets, &tree), &pieces)?;
+    }
+    Ok((pieces, count))
 }
 
 /// Refuses elements that share corners of a face, but not its middles.
-fn middles(mesh: &SolidMesh, neighbours: &Neighbours) -> Result<(), Found> {
-    if mesh.elements.kind().middles().is_empty() {
+fn middles(comm: &dyn Comm, portion: &Portion, joints: &Joints) -> Result<(), Found> {
+    let kind = portion.elements.kind();
+    if kind.middles().is_empty() {
         return Ok(());
     }
-    let (mut count, mut first) = (0, None);
-    for element in 0..mesh.elements.len() {
-        for (side, &other) in neighbours.behind(element).iter().enumerate() {
-            if other == OUTSIDE || (other as usize) < element {
-                continue;
-            }
-            let (face, nodes) = (mesh.elements.face(element, side), mesh.elements.get(other as usize));
-            if let Some(lost) = face.iter().find(|n| !nodes.contains(n)) {
-                count += 1;
-                first.get_or_insert((mesh.points[*lost as usize], [element, other as usize]));
-            }
+    let (mut count, mut first) = (0, None::<Site>);
+    let mut look = |element: usize, side: usize, region: u32, has: &dyn Fn(u32) -> bool| {
+        let face = portion.elements.face(element, side);
+        if let Some(&lost) = face[kind.cell().corners_of_face()..].iter().find(|&&node| !has(node)) {
+            count += 1;
+            let order = [portion.numbers[element].into(), side as u64];
+            let lost = site(order, portion.points[lost as usize], [portion.wholes[element], region]);
+            first = Some(first.map_or(lost, |first| first.min(lost)));
+        }
+    };
+    for (element, side) in joints.inner(portion) {
+        let other = joints.own.behind(element)[side] as usize;
+        if other != OUTSIDE as usize {
+            look(element, side, portion.wholes[other], &|node| portion.elements.get(other).contains(&node));
         }
     }
-    found(mesh, Flaw::Middles(count), first)
+    for across in joints.across.iter().flatten() {
+        let (element, side) = (across.face as usize / kind.faces().len(), across.face as usize % kind.faces().len());
+        if portion.numbers[element] < across.element {
+            look(element, side, across.region, &|node| across.middles.contains(&portion.nodes[node as usize]));
+        }
+    }
+    found(Flaw::Middles(sum(comm, vec![count])[0] as usize), least(comm, first))
 }
 
 /// Refuses boundary faces that touch beyond the nodes that they share.
-fn apart(mesh: &SolidMesh, facets: &[Facet], tree: &BoxTree) -> Result<(), Found> {
-    let boundary: HashSet<[u32; 3]> = match mesh.elements.kind().gmsh().is_split() {
+fn apart(comm: &dyn Comm, portion: &Portion, facets: &[Facet], tree: &BoxTree) -> Result<(), Found> {
+    let boundary: HashSet<[u64; 3]> = match portion.elements.kind().gmsh().is_split() {
         true => facets.iter().map(|facet| sorted(facet.ids)).collect(),
         false => HashSet::new(),
     };
-    let (mut tears, mut holes, mut hole) = (Tears::default(), BTreeSet::new(), None);
+    let (mut tears, mut holes, mut hole) = (Tears::default(), Marks::new(), None::<Site>);
     tree.pairs(|one, other| {
         let [one, other] = [one, other].map(|k| &facets[k as usize]);
-        if one.face == other.face {
+        let (one, other) = if one.number < other.number { (one, other) } else { (other, one) };
+        // The rank of the first looks at both.
+        if one.face() == other.face() || one.element.is_none() {
             return;
         }
-        let elements = [one, other].map(|facet| facet.element as usize);
-        match hole_between(mesh, one, other, &boundary) {
+        match hole_between(one, other, &boundary) {
             Some(nodes) => {
-                hole.get_or_insert((mesh.points[nodes[0] as usize], elements));
-                holes.insert(nodes);
+                let corners = || [one, other].into_iter().flat_map(|facet| facet.ids.into_iter().zip(facet.corners));
+                let near = corners().find(|(id, _)| *id == nodes[0]).expect("it is a corner of one of them").1;
+                let here = site([one.number, other.number], near, [one.region, other.region]);
+                hole = Some(hole.map_or(here, |first| first.min(here)));
+                holes.insert([nodes[0] << 32 | nodes[1], nodes[2] << 32 | nodes[3]], FIRST);
             }
-            None => tears.add(mesh.points.len(), one, other),
+            None => tears.add(one, other),
         }
     });
-    found(mesh, tears.flaw(), tears.first)?;
-    found(mesh, Flaw::Holes(holes.len()), hole)
+    let first = least(comm, tears.first);
+    if first.is_some() {
+        found(tears.flaw(comm), first)?;
+    }
+    match least(comm, hole) {
+        Some(first) => found(Flaw::Holes(count(comm, holes)[0]), Some(first)),
+        None => Ok(()),
+    }
+}
+
+/// What is known of nodes, faces or holes.
+type Marks = BTreeMap<[u64; 2], u64>;
+const FIRST: u64 = 1;
+const SECOND: u64 = 2;
+
+/// How many have the first mark on some rank, and how many only the second. Collective.
+fn count(comm: &dyn Comm, marks: Marks) -> [usize; 2] {
+    let mut outgoing = vec![Vec::new(); comm.size()];
+    for ([a, b], mark) in marks {
+        outgoing[((a ^ b) % comm.size() as u64) as usize].extend([a, b, mark]);
+    }
+    let mut all = Marks::new();
+    for &[a, b, mark] in comm.all_to_all(outgoing).iter().flat_map(|theirs| theirs.as_chunks::<3>().0) {
+        *all.entry([a, b]).or_default() |= mark;
+    }
+    let first = all.values().filter(|mark| **mark & FIRST > 0).count();
+    let sums = sum(comm, vec![first as u64, (all.len() - first) as u64]);
+    [sums[0] as usize, sums[1] as usize]
 }
 
 /// Where boundary faces touch that should not.
 #[derive(Default)]
 struct Tears {
-    coincident: BTreeSet<u32>,
-    hanging: BTreeSet<u32>,
-    crossing: BTreeSet<u32>,
-    /// Faces with nodes near them.
-    touching: BTreeSet<u32>,
-    first: Option<([f64; 3], [usize; 2])>,
+    /// First those that coincide, second those that hang.
+    nodes: Marks,
+    /// First those with nodes near them, second those that cross.
+    faces: Marks,
+    first: Option<Site>,
 }
 
 impl Tears {
-    /// Looks at two facets of a mesh with so many nodes.
-    fn add(&mut self, nodes: usize, a: &Facet, b: &Facet) {
+    /// Looks at two facets.
+    fn add(&mut self, a: &Facet, b: &Facet) {
         let near = a.near.min(b.near);
         if a.is_aside(b, near) || b.is_aside(a, near) {
             return;
         }
-        let is_node = |id: &u32| (*id as usize) < nodes;
         let mut place = None;
         for (one, two) in [(a, b), (b, a)] {
-            for (node, x) in one.own(two).filter(|(node, _)| is_node(node)) {
+            for (node, x) in one.own(two).filter(|(node, _)| Facet::is_node(*node)) {
                 if to_triangle(x, &two.corners) <= near * near {
-                    let met = two.own(one).any(|(id, y)| is_node(&id) && of_points(x, y) <= near * near);
-                    if met { &mut self.coincident } else { &mut self.hanging }.insert(node);
+                    let met = two.own(one).any(|(id, y)| Facet::is_node(id) && of_points(x, y) <= near * near);
+                    *self.nodes.entry([node, 0]).or_default() |= if met { FIRST } else { SECOND };
                     place.get_or_insert(x);
                 }
             }
         }
-        if place.is_some() {
-            self.touching.extend([a.face, b.face]);
-        } else if a.crosses(b, near) {
-            self.crossing.extend([a.face, b.face]);
+        let mark = if place.is_some() { FIRST } else { SECOND };
+        if place.is_none() && a.crosses(b, near) {
             place = Some(a.corners[0]);
         }
-        self.first = self.first.or(place.map(|place| (place, [a.element as usize, b.element as usize])));
+        let Some(place) = place else { return };
+        [a, b].into_iter().for_each(|facet| *self.faces.entry([facet.face(), 0]).or_default() |= mark);
+        let here = site([a.number, b.number], place, [a.region, b.region]);
+        self.first = Some(self.first.map_or(here, |first| first.min(here)));
     }
 
-    fn flaw(&self) -> Flaw {
-        Flaw::Torn {
-            coincident: self.coincident.len(),
-            hanging: self.hanging.difference(&self.coincident).count(),
-            crossing: self.crossing.difference(&self.touching).count(),
-        }
+    fn flaw(self, comm: &dyn Comm) -> Flaw {
+        let [coincident, hanging] = count(comm, self.nodes);
+        let [_, crossing] = count(comm, self.faces);
+        Flaw::Torn { coincident, hanging, crossing }
     }
 }
 
 /// Refuses pieces that share nodes.
-fn hinges(mesh: &SolidMesh, pieces: &[u32]) -> Result<(), Found> {
-    let mut of_node = vec![u32::MAX; mesh.points.len()];
-    let (mut nodes, mut first) = (BTreeSet::new(), None);
-    for (element, &piece) in pieces.iter().enumerate() {
-        for &node in mesh.elements.get(element) {
-            let known = &mut of_node[node as usize];
-            if *known == u32::MAX {
-                *known = piece;
-            } else if *known != piece {
-                let other =
-                    || pieces.iter().zip(&mesh.elements).position(|(p, nodes)| p == known && nodes.contains(&node));
-                first.get_or_insert_with(|| (mesh.points[node as usize], [other().unwrap_or(element), element]));
-                nodes.insert(node);
+fn hinges(comm: &dyn Comm, portion: &Portion, joints: &Joints, pieces: &[u32]) -> Result<(), Found> {
+    // The first element around each node, its piece and its region.
+    let mut firsts = vec![[u64::MAX; 3]; portion.nodes.len()];
+    for (element, nodes) in portion.elements.iter().enumerate() {
+        let its = [portion.numbers[element], pieces[element], portion.wholes[element]].map(u64::from);
+        nodes.iter().for_each(|&node| firsts[node as usize] = firsts[node as usize].min(its));
+    }
+    joints.agree(comm, &mut firsts, |mine, theirs| *mine = (*mine).min(theirs));
+    let (mut nodes, mut first) = (Marks::new(), None::<Site>);
+    for (element, its) in portion.elements.iter().enumerate() {
+        for (k, &node) in (0..).zip(its) {
+            let [_, piece, region] = firsts[node as usize];
+            if piece != u64::from(pieces[element]) {
+                nodes.insert([portion.nodes[node as usize].into(), 0], FIRST);
+                let order = [portion.numbers[element].into(), k];
+                let here = site(order, portion.points[node as usize], [region as u32, portion.wholes[element]]);
+                first = Some(first.map_or(here, |first| first.min(here)));
             }
         }
     }
-    found(mesh, Flaw::Hinge(nodes.len()), first)
+    found(Flaw::Hinge(count(comm, nodes)[0]), least(comm, first))
 }
 
 /// Refuses pieces inside of others: a ray from there leaves another piece once more than it enters it.
-fn inside(mesh: &SolidMesh, facets: &[Facet], tree: &BoxTree, pieces: &[u32], count: usize) -> Result<(), Found> {
-    let (mut inner, mut first) = (0, None);
-    let mut seen = vec![false; count];
-    for (element, &piece) in pieces.iter().enumerate() {
-        if std::mem::replace(&mut seen[piece as usize], true) {
-            continue;
-        }
-        // A place within the element that lines through nodes hardly meet.
-        let corners = mesh.elements.get(element)[..4].iter().map(|&n| mesh.points[n as usize]);
+fn inside(
+    comm: &dyn Comm,
+    portion: &Portion,
+    (facets, tree): (&[Facet], &BoxTree),
+    pieces: &[u32],
+) -> Result<(), Found> {
+    // A place within the first element of each piece that lines through nodes hardly meet.
+    let mut firsts: BTreeMap<u32, (u32, usize)> = BTreeMap::new();
+    for (element, (&piece, &number)) in pieces.iter().zip(&portion.numbers).enumerate() {
+        let first = firsts.entry(piece).or_insert((number, element));
+        *first = (*first).min((number, element));
+    }
+    let place = |(&piece, &(number, element)): (&u32, &(u32, usize))| {
+        let corners = portion.elements.get(element)[..4].iter().map(|&n| portion.points[n as usize]);
         let weighted: Vec<_> = corners.zip([0.2137, 0.3391, 0.1873, 0.2599]).collect();
-        let x: [f64; 3] = std::array::from_fn(|i| weighted.iter().map(|(corner, weight)| weight * corner[i]).sum());
-        let mut leaves = BTreeMap::new();
+        let x = std::array::from_fn(|i| weighted.iter().map(|(corner, weight)| weight * corner[i]).sum());
+        site([piece.into(), number.into()], x, [portion.wholes[element], 0])
+    };
+    let mut places: Vec<Site> =
+        all_gather_u64(comm, firsts.iter().map(place).collect::<Vec<_>>().as_flattened()).as_chunks().0.to_vec();
+    places.sort_unstable();
+    places.dedup_by_key(|place| place[0]);
+    // How often rays leave own faces of each piece, and the first element that they leave with its region.
+    let mut mine = Vec::new();
+    for &[piece, _, x, y, z, ..] in &places {
+        let x = [x, y, z].map(f64::from_bits);
+        let mut leaves: BTreeMap<u32, (i64, u64, u32)> = BTreeMap::new();
         tree.meeting(&[x, [f64::INFINITY, x[1], x[2]]], |k| {
-            let Facet { corners, element, .. } = &facets[k as usize];
+            let Facet { corners, element: Some(element), number, region, .. } = &facets[k as usize] else { return };
             let away = [x, [2.0 * around(corners)[1][0] - x[0], x[1], x[2]]];
             if pierces(&away, corners, 0.0) {
                 let [a, b, c] = *corners;
-                let (sum, _) = leaves.entry(pieces[*element as usize]).or_insert((0, *element));
-                *sum += if volume(a, b, c, x) < 0.0 { 1 } else { -1 };
+                let its = leaves.entry(pieces[*element as usize]).or_insert((0, u64::MAX, 0));
+                its.0 += if volume(a, b, c, x) < 0.0 { 1 } else { -1 };
+                (its.1, its.2) = (its.1, its.2).min((*number, *region));
             }
         });
-        if let Some((_, (_, other))) = leaves.iter().find(|(other, (sum, _))| **other != piece && *sum > 0) {
-            inner += 1;
-            first.get_or_insert((x, [element, *other as usize]));
-        }
+        let packed = |(other, (sum, number, region))| [piece, u64::from(other), sum as u64, number, u64::from(region)];
+        mine.extend(leaves.into_iter().map(packed));
     }
-    found(mesh, Flaw::Inside(inner), first)
-}
-
-/// The flaw, if it was found somewhere: at a place of two elements.
-fn found(mesh: &SolidMesh, flaw: Flaw, first: Option<([f64; 3], [usize; 2])>) -> Result<(), Found> {
-    match first {
-        Some((near, elements)) => Err(Found { flaw, near, regions: elements.map(|element| mesh.region(element)) }),
-        None => Ok(()),
+    let mut leaves: BTreeMap<[u64; 2], (i64, [u64; 2])> = BTreeMap::new();
+    for &[piece, other, sum, number, region] in all_gather_u64(comm, mine.as_flattened()).as_chunks::<5>().0 {
+        let its = leaves.entry([piece, other]).or_insert((0, [u64::MAX; 2]));
+        *its = (its.0.wrapping_add(sum as i64), its.1.min([number, region]));
     }
+    let is_inside = |place: &&Site| {
+        let of_piece = leaves.range([place[0], 0]..=[place[0], u64::MAX]);
+        of_piece.clone().find(|(key, (sum, _))| key[1] != key[0] && *sum > 0).map(|(_, (_, [_, region]))| *region)
+    };
+    let inner = places.iter().filter(|place| is_inside(place).is_some()).count();
+    let first = places.iter().find_map(|place| {
+        let [a, b, x, y, z, region, _] = *place;
+        Some([a, b, x, y, z, region, is_inside(&place)?])
+    });
+    found(Flaw::Inside(inner), first)
 }
 
 #[cfg(test)]

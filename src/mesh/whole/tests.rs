@@ -1,7 +1,10 @@
 use super::*;
+use crate::comm::solo::Solo;
+use crate::comm::threads;
+use crate::comm::words::share;
 use crate::element::Kind;
 use crate::element::cell::EDGES;
-use crate::mesh::{Elements, Mapped, split};
+use crate::mesh::{Mapped, split};
 use crate::random::Random;
 
 const KINDS: [Kind; 3] = [Kind::Tet4, Kind::Tet10, Kind::Hex8];
@@ -11,12 +14,12 @@ fn planes(from: f64, to: f64, cells: usize) -> Vec<f64> {
 }
 
 /// A box of hexahedra.
-fn block(low: [f64; 3], high: [f64; 3], cells: [usize; 3]) -> SolidMesh {
-    Mapped::Grid { planes: std::array::from_fn(|a| planes(low[a], high[a], cells[a])) }.mesh(Kind::Hex8)
+fn block(low: [f64; 3], high: [f64; 3], cells: [usize; 3]) -> Portion {
+    Mapped::Grid { planes: std::array::from_fn(|a| planes(low[a], high[a], cells[a])) }.mesh(&Solo, Kind::Hex8).portion
 }
 
 /// One mesh of several, each a region. Nodes at one place are one where `glued`.
-fn join(kind: Kind, parts: &[SolidMesh], glued: impl Fn([f64; 3]) -> bool) -> SolidMesh {
+fn join(kind: Kind, parts: &[Portion], glued: impl Fn([f64; 3]) -> bool) -> Portion {
     let (mut points, mut nodes, mut regions, mut known) = (Vec::new(), Vec::new(), Vec::new(), BTreeMap::new());
     for (region, part) in (0..).zip(parts) {
         let new = |&x: &[f64; 3]| {
@@ -32,17 +35,15 @@ fn join(kind: Kind, parts: &[SolidMesh], glued: impl Fn([f64; 3]) -> bool) -> So
         nodes.extend(part.elements.nodes().iter().map(|&n| number[n as usize]));
         regions.extend(part.elements.iter().map(|_| region));
     }
-    let elements = Elements::new(Kind::Hex8, nodes);
-    let mesh = SolidMesh { points, elements, cells: 0, surfaces: Vec::new(), regions, pieces: Vec::new() };
-    cut(kind, mesh, |x, _| x)
+    cut(kind, mesh(Kind::Hex8, &points, &nodes, regions), |x, _| x)
 }
 
 /// Hexahedra as elements of a kind, quadrilaterals cut at the corner that comes first in an order of places, by region.
-fn cut(kind: Kind, hexahedra: SolidMesh, order: impl Fn([f64; 3], usize) -> [f64; 3]) -> SolidMesh {
+fn cut(kind: Kind, hexahedra: Portion, order: impl Fn([f64; 3], usize) -> [f64; 3]) -> Portion {
     if kind == Kind::Hex8 {
         return hexahedra;
     }
-    let SolidMesh { mut points, elements, regions, .. } = hexahedra;
+    let Portion { mut points, elements, wholes: regions, .. } = hexahedra;
     let (mut nodes, mut of_elements, mut middles) = (Vec::new(), Vec::new(), BTreeMap::new());
     for (cell, &region) in elements.iter().zip(&regions) {
         let keys: Vec<[f64; 3]> = cell.iter().map(|&n| order(points[n as usize], region as usize)).collect();
@@ -59,29 +60,56 @@ fn cut(kind: Kind, hexahedra: SolidMesh, order: impl Fn([f64; 3], usize) -> [f64
             of_elements.push(region);
         });
     }
-    let elements = Elements::new(kind, nodes);
-    SolidMesh { points, elements, cells: 0, surfaces: Vec::new(), regions: of_elements, pieces: Vec::new() }
+    mesh(kind, &points, &nodes, of_elements)
 }
 
-fn pieces_of(mesh: &SolidMesh) -> Result<usize, Found> {
-    let neighbours = Neighbours::new(mesh.points.len(), &mesh.elements);
-    assert_eq!(neighbours.overlapping, 0);
-    pieces(mesh, &neighbours).map(|pieces| pieces.into_iter().max().map_or(1, |last| last as usize + 1))
+/// All of a mesh.
+fn mesh(kind: Kind, points: &[[f64; 3]], nodes: &[u32], regions: Vec<u32>) -> Portion {
+    Portion { wholes: regions, ..Portion::new(kind, 0, nodes, |node| points[node as usize]) }
+}
+
+/// The number of pieces, or the flaw; the same on one rank, on three with shares of the elements, and on five of which the first
+/// two have some in turn.
+#[track_caller]
+fn pieces_of(mesh: &Portion) -> Result<usize, Found> {
+    let alone = pieces_on(&Solo, mesh, &|_| true).map(|(pieces, count)| {
+        assert_eq!(pieces.iter().max().map(|&last| last as usize + 1), Some(count));
+        count
+    });
+    let shared = threads::run(3, |comm| {
+        let own = share(mesh.len() as u64, comm);
+        pieces_on(comm, mesh, &|at| own.contains(&(at as u64))).map(|(_, count)| count)
+    });
+    let in_turn = threads::run(5, |comm| pieces_on(comm, mesh, &|at| comm.rank() == at % 2).map(|(_, count)| count));
+    shared.iter().chain(&in_turn).for_each(|found| assert_eq!(found, &alone));
+    alone
+}
+
+/// The pieces of the elements that a rank has.
+fn pieces_on(comm: &dyn Comm, mesh: &Portion, has: &dyn Fn(usize) -> bool) -> Result<(Vec<u32>, usize), Found> {
+    let places: Vec<usize> = (0..mesh.len()).filter(|&at| has(at)).collect();
+    let nodes: Vec<u32> = places.iter().flat_map(|&at| mesh.elements.get(at)).copied().collect();
+    let portion = Portion::new(mesh.elements.kind(), 0, &nodes, |node| mesh.points[node as usize]);
+    let of_places = |values: &[u32]| places.iter().map(|&at| values[at]).collect();
+    let portion = Portion { numbers: of_places(&mesh.numbers), wholes: of_places(&mesh.wholes), ..portion };
+    let joints = Joints::new(comm, &portion);
+    assert_eq!(joints.overlapping, None);
+    pieces(comm, &portion, &joints)
 }
 
 #[track_caller]
-fn flaw(mesh: &SolidMesh) -> Found {
+fn flaw(mesh: &Portion) -> Found {
     pieces_of(mesh).expect_err("it only looks whole")
 }
 
 /// The same mesh turned, scaled and moved.
-fn moved(mesh: &SolidMesh, scale: f64) -> SolidMesh {
+fn moved(mesh: &Portion, scale: f64) -> Portion {
     let [c, s] = [0.8, 0.6];
     let turned = |[x, y, z]: [f64; 3]| {
         let [x, y] = [c * x - s * y, s * x + c * y];
         [x, c * y - s * z, s * y + c * z].map(|x| scale * (x + 10.0))
     };
-    SolidMesh { points: mesh.points.iter().map(|&x| turned(x)).collect(), ..mesh.clone() }
+    Portion { points: mesh.points.iter().map(|&x| turned(x)).collect(), ..mesh.clone() }
 }
 
 #[test]
@@ -93,9 +121,9 @@ fn sound_meshes_raise_no_alarm() {
         assert_eq!(pieces_of(&join(kind, &[distorted], |_| true)), Ok(1));
         // Layers a millionth as thick as wide, outside and within.
         let thin = vec![0.0, 1e-6, 0.5, 0.500_001, 1.0];
-        let layers = Mapped::Grid { planes: [planes(0.0, 1.0, 3), thin.clone(), thin] }.mesh(kind);
+        let layers = Mapped::Grid { planes: [planes(0.0, 1.0, 3), thin.clone(), thin] }.mesh(&Solo, kind).portion;
         assert_eq!(pieces_of(&layers), Ok(1));
-        let cylinder = Mapped::Cylinder { radii: [0.7, 1.0], height: 0.5, cells: [2, 9, 2] }.mesh(kind);
+        let cylinder = Mapped::Cylinder { radii: [0.7, 1.0], height: 0.5, cells: [2, 9, 2] }.mesh(&Solo, kind).portion;
         assert_eq!(pieces_of(&cylinder), Ok(1));
         // Nodes of both sides glued; parts that share an edge, but are joined elsewhere.
         let beside = |(x, y): (f64, f64)| block([x, y, 0.0], [x + 1.0, y + 1.0, 1.0], [2; 3]);
@@ -150,8 +178,11 @@ fn half_glued_interfaces_are_found_with_their_nodes_and_place() {
     let other = |n: u32| both.iter().position(|&c| c == n).map_or(n, |k| first + k as u32);
     let is_upper = |nodes: &[u32]| nodes.iter().all(|&n| slit.points[n as usize][2] >= 0.5);
     let torn = |nodes: &[u32]| nodes.iter().map(|&n| if is_upper(nodes) { other(n) } else { n }).collect::<Vec<_>>();
-    slit.elements = Elements::new(Kind::Hex8, slit.elements.iter().flat_map(torn).collect());
-    assert_eq!(flaw(&slit).flaw, Flaw::Torn { coincident: 20, hanging: 0, crossing: 0 });
+    let nodes: Vec<u32> = slit.elements.iter().flat_map(torn).collect();
+    assert_eq!(
+        flaw(&mesh(Kind::Hex8, &slit.points, &nodes, slit.wholes)).flaw,
+        Flaw::Torn { coincident: 20, hanging: 0, crossing: 0 }
+    );
 }
 
 #[test]
@@ -207,18 +238,20 @@ fn pieces_joined_by_an_edge_or_a_corner_are_hinges() {
 
 #[test]
 fn middles_that_are_not_shared_are_found() {
-    let mut mesh = join(Kind::Tet10, &[block([0.0; 3], [1.0; 3], [2; 3])], |_| true);
+    let mut sound = join(Kind::Tet10, &[block([0.0; 3], [1.0; 3], [2; 3])], |_| true);
     // The middle of an edge inside, given a copy in one element alone.
     let inside = |x: &[f64; 3]| x.iter().all(|x| (0.1..0.9).contains(x));
-    let mut nodes = mesh.elements.nodes().to_vec();
-    let place = (0..nodes.len()).find(|k| k % 10 > 3 && inside(&mesh.points[nodes[*k] as usize]));
+    let mut nodes = sound.elements.nodes().to_vec();
+    let place = (0..nodes.len()).find(|k| k % 10 > 3 && inside(&sound.points[nodes[*k] as usize]));
     let place = place.expect("there are edges inside");
-    let copy = mesh.points[nodes[place] as usize];
-    nodes[place] = mesh.points.len() as u32;
-    mesh.points.push(copy);
-    mesh.elements = Elements::new(Kind::Tet10, nodes);
+    let copy = sound.points[nodes[place] as usize];
+    nodes[place] = sound.points.len() as u32;
+    sound.points.push(copy);
     // Between that element and the two beside it that have the edge.
-    assert_eq!(flaw(&mesh), Found { flaw: Flaw::Middles(2), near: copy, regions: [0, 0] });
+    assert_eq!(
+        flaw(&mesh(Kind::Tet10, &sound.points, &nodes, sound.wholes)),
+        Found { flaw: Flaw::Middles(2), near: copy, regions: [0, 0] }
+    );
 }
 
 #[test]
@@ -229,7 +262,7 @@ fn pieces_inside_of_others_are_told_from_pieces_in_their_cavities() {
         assert_eq!((found.flaw, found.regions), (Flaw::Inside(1), [1, 0]));
         let cells = (0..27).filter(|cell| *cell != 13).map(|cell| [cell % 3, cell / 3 % 3, cell / 9]);
         let cell = |at: [usize; 3]| block(at.map(|k| k as f64), at.map(|k| k as f64 + 1.0), [1; 3]);
-        let shell: Vec<SolidMesh> = cells.map(cell).collect();
+        let shell: Vec<Portion> = cells.map(cell).collect();
         assert_eq!(pieces_of(&join(kind, &[shell, vec![small]].concat(), |_| true)), Ok(2));
     }
 }

@@ -3,8 +3,6 @@
 //! A box of cells is analysed as it is if it is small. A larger one is like a small cube: the factor grows with the nodes to the
 //! power 4/3 (nested dissection: George 1973), the matrix with the nodes.
 
-use std::collections::BTreeMap;
-
 use crate::decomposition::{Bodies, Shape, Subdomain, number_bodies};
 use crate::element::Kind;
 use crate::feti::inverse::factor::Symbolic;
@@ -40,7 +38,7 @@ fn scaled(kind: Kind, cells: [usize; 3], nodes: f64) -> Lengths {
 
 fn analysed(kind: Kind, cells: [usize; 3]) -> Lengths {
     let bodies = number_bodies([(kind, Shape::Brick(brick(cells)), vec![0])]);
-    let all = Bodies { bodies: &bodies, meshes: &BTreeMap::new(), surfaces: &[] };
+    let all = Bodies { bodies: &bodies, surfaces: &[] };
     let elements: Vec<u64> = (0..bodies[0].counts().elements).collect();
     let subdomain = Subdomain::of_brick(0, &all, 0, &elements);
     let symbolic = Symbolic::new(&subdomain);

@@ -192,7 +192,7 @@ fn factors_of_large_boxes_follow_from_small_ones() {
     for (kind, cells) in [(Kind::Tet4, [16, 16, 16]), (Kind::Hex8, [30, 15, 15]), (Kind::Tet10, [8, 8, 8])] {
         let brick = Brick { origin: [0.0; 3], size: cells.map(|n| n as f64), cells };
         let bodies = number_bodies([(kind, Shape::Brick(brick), vec![0])]);
-        let all = Bodies { bodies: &bodies, meshes: &Default::default(), surfaces: &[] };
+        let all = Bodies { bodies: &bodies, surfaces: &[] };
         let elements: Vec<u64> = (0..bodies[0].counts().elements).collect();
         let symbolic = Symbolic::new(&Subdomain::of_brick(0, &all, 0, &elements));
         let found = local::of_box(kind, cells);

@@ -1,6 +1,6 @@
-//! What several ranks have: nodes and faces on the borders of their portions.
+//! What several ranks have, as the nodes and faces on the borders of their portions of a mesh.
 
-use crate::comm::Comm;
+use super::Comm;
 
 /// For each rank the places of the keys that it has too, in the order of the keys: the same order there. A rank has a key once.
 /// Collective.

@@ -3,12 +3,30 @@
 //!
 //! Ranks need not sort among themselves: the ends of the parts are found by bisection, from counts of all ranks.
 
-use super::sum;
 use super::wholes::Wholes;
-use crate::comm::Comm;
+use crate::comm::words::sum;
+use crate::comm::{Comm, maximum};
 
 /// Bits of each coordinate that places are made of.
 const BITS: u32 = 20;
+/// Cells of the grid along the longest side of all points.
+const GRID: f64 = (1 << 24) as f64;
+
+/// Points in cells of a grid over those of all ranks. Collective.
+pub fn on_grid(comm: &dyn Comm, points: &[[f64; 3]]) -> Vec<[i32; 3]> {
+    let mut extremes = vec![f64::NEG_INFINITY; 6];
+    for (point, axis) in points.iter().flat_map(|point| (0..3).map(move |axis| (point, axis))) {
+        extremes[axis] = extremes[axis].max(point[axis]);
+        extremes[3 + axis] = extremes[3 + axis].max(-point[axis]);
+    }
+    let extremes = maximum(comm, &extremes);
+    let longest = (0..3).map(|axis| extremes[axis] + extremes[3 + axis]).fold(f64::MIN_POSITIVE, f64::max);
+    let last = GRID as i32 - 1;
+    let place = |point: &[f64; 3]| {
+        std::array::from_fn(|axis| (((point[axis] + extremes[3 + axis]) / longest * GRID) as i32).min(last))
+    };
+    points.iter().map(place).collect()
+}
 
 /// Puts all elements into parts, `wholes` being those of the elements and `points` on a grid of 24 bits. Collective.
 pub fn start(comm: &dyn Comm, points: &[[i32; 3]], of_elements: &[u32], wholes: &Wholes) -> Vec<u32> {
@@ -18,7 +36,7 @@ pub fn start(comm: &dyn Comm, points: &[[i32; 3]], of_elements: &[u32], wholes: 
     sorted.sort_unstable();
     let count = |key: (u32, u64)| sorted.partition_point(|other| *other <= key) as u64;
     let first = |whole: u32| sorted.partition_point(|key| key.0 < whole) as u64;
-    let before: Vec<u64> = (0..wholes.len() as u32).map(first).collect();
+    let before: Vec<u64> = (0..wholes.count() as u32).map(first).collect();
     // For each part the last place that is in it: the first one up to which there are enough elements.
     let mut ends = vec![[0_u64, (1 << (3 * BITS)) - 1]; wholes.parts()];
     for _ in 0..3 * BITS {

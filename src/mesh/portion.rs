@@ -1,19 +1,21 @@
-//! Elements of one body on their way from where the mesh is to the ranks that own their parts.
+//! The elements of one body that a rank has, and how they get to other ranks. No rank needs to have all of a mesh.
 
-use super::super::subdomain::{pack_pairs, unpack_pairs};
-use super::super::{BodyMesh, Shape};
+use super::Elements;
+use super::curve::{self, on_grid};
+use super::wholes::Wholes;
 use crate::comm::Comm;
+use crate::comm::words::{pack_pairs, unpack_pairs};
 use crate::element::Kind;
-use crate::mesh::{Elements, SolidMesh};
 
 /// A rank's elements of one body.
-#[derive(Clone)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Portion {
     /// Numbers of the elements within the body.
     pub numbers: Vec<u32>,
     /// Elements by places in `nodes`.
     pub elements: Elements,
-    /// For each element its whole: a face-connected piece of one region of the body.
+    /// For each element the region of the body that it is in; once pieces are known its whole, which is a face-connected
+    /// piece of one region.
     pub wholes: Vec<u32>,
     /// For each element the part that it is in.
     pub part: Vec<u32>,
@@ -23,41 +25,19 @@ pub struct Portion {
     pub points: Vec<[f64; 3]>,
 }
 
-/// Of this rank's share in some items: consecutive ones, as many as others have, give or take one.
-fn share(items: u64, comm: &dyn Comm) -> std::ops::Range<u64> {
-    let end = |rank: usize| (u128::from(items) * rank as u128 / comm.size() as u128) as u64;
-    end(comm.rank())..end(comm.rank() + 1)
-}
-
 impl Portion {
-    /// This rank's share in a brick, which it generates.
-    fn of_brick(body: &BodyMesh, comm: &dyn Comm) -> Self {
-        let lattice = body.lattice().expect("the body is a brick");
-        let numbers: Vec<u32> = share(body.counts().elements, comm).map(|number| number as u32).collect();
-        let of_elements: Vec<u32> =
-            numbers.iter().flat_map(|&number| body.element(u64::from(number))).map(|node| node as u32).collect();
-        let mut nodes = of_elements.clone();
+    /// Of a rank's elements with consecutive numbers from `first` on, by the numbers of their nodes within the body.
+    /// They are in the first region. `point` tells where a node is.
+    pub fn new(kind: Kind, first: u32, of_elements: &[u32], point: impl Fn(u32) -> [f64; 3]) -> Self {
+        let mut nodes = of_elements.to_vec();
         nodes.sort_unstable();
         nodes.dedup();
         let local = |node: &u32| nodes.binary_search(node).expect("every node is listed") as u32;
-        let elements = Elements::new(body.kind, of_elements.iter().map(local).collect());
-        let point = |&node: &u32| lattice.coordinates(lattice.node_position(u64::from(node)));
-        let points = nodes.iter().map(point).collect();
-        let zeros = vec![0; numbers.len()];
+        let elements = Elements::new(kind, of_elements.iter().map(local).collect());
+        let points = nodes.iter().map(|&node| point(node)).collect();
+        let zeros = vec![0; elements.len()];
+        let numbers = (first..).take(elements.len()).collect();
         Self { wholes: zeros.clone(), part: zeros, numbers, elements, points, nodes }
-    }
-
-    /// All of a mesh.
-    fn of_mesh(mesh: &SolidMesh, wholes: Vec<u32>) -> Self {
-        let count = mesh.elements.len();
-        Self {
-            numbers: (0..count as u32).collect(),
-            elements: mesh.elements.clone(),
-            wholes,
-            part: vec![0; count],
-            nodes: (0..mesh.points.len() as u32).collect(),
-            points: mesh.points.clone(),
-        }
     }
 
     /// What identifies a face of an element within the body: three corners.
@@ -69,31 +49,30 @@ impl Portion {
         [nodes[0] << 32 | nodes[1], nodes[2]]
     }
 
-    fn none(kind: Kind) -> Self {
-        Self {
-            numbers: Vec::new(),
-            elements: Elements::new(kind, Vec::new()),
-            wholes: Vec::new(),
-            part: Vec::new(),
-            nodes: Vec::new(),
-            points: Vec::new(),
+    /// The same elements, of which each rank has a piece of a Hilbert curve. Collective.
+    pub fn along_curve(mut self, comm: &dyn Comm, elements: u64) -> Self {
+        if comm.size() == 1 {
+            return self;
         }
-    }
-
-    /// This rank's share in a body. `mesh` is that of rank 0, with the wholes of its elements, if the body is no brick. Collective.
-    pub fn new(body: &BodyMesh, mesh: Option<(&SolidMesh, Vec<u32>)>, comm: &dyn Comm) -> Self {
-        if let Shape::Brick(_) = body.shape {
-            return Self::of_brick(body, comm);
-        }
-        let all = mesh.map_or_else(|| Self::none(body.kind), |(mesh, wholes)| Self::of_mesh(mesh, wholes));
-        let count = body.counts().elements.max(1);
-        let owner = |at: usize| (at as u128 * comm.size() as u128 / u128::from(count)) as usize;
-        all.sent(comm, owner)
+        let wholes = Wholes::new(vec![elements], vec![comm.size() as u32]);
+        let owners = curve::start(comm, &on_grid(comm, &self.centres()), &vec![0; self.len()], &wholes);
+        self.part.fill(0);
+        self.sent(comm, |at| owners[at] as usize)
     }
 
     /// Number of elements.
     pub fn len(&self) -> usize {
         self.numbers.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.numbers.is_empty()
+    }
+
+    /// Where the nodes of an element are.
+    pub fn places(&self, element: usize) -> Vec<[f64; 3]> {
+        self.elements.get(element).iter().map(|&node| self.points[node as usize]).collect()
     }
 
     /// Mean of the corners of each element.
@@ -112,7 +91,7 @@ impl Portion {
         let mut places = vec![Vec::new(); comm.size()];
         (0..self.len()).for_each(|at| places[owner(at)].push(at));
         places.iter_mut().for_each(|places| places.sort_by_key(|&at| self.part[at]));
-        let mut number = vec![u32::MAX; self.nodes.len()];
+        let mut number = vec![0; self.nodes.len()];
         let outgoing = places.iter().map(|places| self.pack(places, &mut number)).collect();
         drop((places, number));
         let kind = self.elements.kind();
@@ -120,24 +99,21 @@ impl Portion {
         Self::merged(kind, &received)
     }
 
-    /// Some elements as numbers. `number` is as long as the nodes and holds `u32::MAX`, before and after.
+    /// Some elements as numbers. `number` is as long as the nodes.
     fn pack(&self, places: &[usize], number: &mut [u32]) -> Vec<u64> {
         let of_elements = || places.iter().flat_map(|&at| self.elements.get(at));
-        of_elements().for_each(|&node| number[node as usize] = 0);
-        let mut used = Vec::new();
-        for (node, number) in number.iter_mut().enumerate().filter(|(_, number)| **number == 0) {
-            *number = used.len() as u32;
-            used.push(node);
-        }
+        let mut used: Vec<u32> = of_elements().copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        (0..).zip(&used).for_each(|(k, &node)| number[node as usize] = k);
         let mut message = vec![places.len() as u64, used.len() as u64];
         let per_element = |values: &[u32]| places.iter().map(|&at| values[at]).collect::<Vec<_>>();
         [&self.numbers, &self.wholes, &self.part]
             .into_iter()
             .for_each(|values| pack_pairs(&per_element(values), &mut message));
         pack_pairs(&of_elements().map(|&node| number[node as usize]).collect::<Vec<_>>(), &mut message);
-        pack_pairs(&used.iter().map(|&node| self.nodes[node]).collect::<Vec<_>>(), &mut message);
-        message.extend(used.iter().flat_map(|&node| self.points[node]).map(f64::to_bits));
-        used.into_iter().for_each(|node| number[node] = u32::MAX);
+        pack_pairs(&used.iter().map(|&node| self.nodes[node as usize]).collect::<Vec<_>>(), &mut message);
+        message.extend(used.iter().flat_map(|&node| self.points[node as usize]).map(f64::to_bits));
         message
     }
 

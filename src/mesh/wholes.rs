@@ -23,7 +23,7 @@ impl Wholes {
     }
 
     /// Number of wholes.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.sizes.len()
     }
 
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn parts_of_wholes_are_numbered_one_behind_the_other() {
         let wholes = Wholes::new(vec![10, 4], vec![3, 2]);
-        assert_eq!((wholes.len(), wholes.parts(), wholes.first(1), wholes.mean(1)), (2, 5, 3, 2.0));
+        assert_eq!((wholes.count(), wholes.parts(), wholes.first(1), wholes.mean(1)), (2, 5, 3, 2.0));
         assert_eq!((0..5).map(|part| wholes.of_part(part)).collect::<Vec<_>>(), [0, 0, 0, 1, 1]);
     }
 }
