@@ -17,6 +17,7 @@ use faer::linalg::solvers::DenseSolveCore;
 use super::bonds::{Bonds, Member};
 use crate::feti::inverse::kernel::MODES;
 use crate::simd::vectorised;
+use crate::work;
 
 /// `W`, `S^-1` and `(G S^-1 G')^-1`, by columns.
 pub struct DenseProblem {
@@ -29,6 +30,11 @@ impl DenseProblem {
     /// From `W` of each member, by columns in the order of its jumps; `None` if that has no inverse.
     pub fn new(bonds: &Bonds, responses: Vec<Rc<Vec<f64>>>) -> Option<Self> {
         let (n, m) = (bonds.rows, MODES * bonds.members.len());
+        // S and H from their factors, and two inverses.
+        let jumps = |member: &Member| member.jumps.iter().map(|jump| 2 * jump.entries.len()).sum::<usize>();
+        let s: usize = bonds.members.iter().map(|member| jumps(member) * member.jumps.len()).sum();
+        let h: usize = bonds.members.iter().map(|member| 2 * MODES * n * member.jumps.len()).sum();
+        work::add(s + h + 2 * (n.pow(3) + m.pow(3)), size_of::<f64>() * (n * n + m * m));
         let mut s = Mat::zeros(n, n);
         for (member, response) in bonds.members.iter().zip(&responses) {
             for (one, column) in member.jumps.iter().zip(response.chunks_exact(member.modes.len())) {
@@ -65,6 +71,10 @@ impl DenseProblem {
     /// From `v` of the members to `u`, and from `R't` to what balances the members: their multipliers `mu`.
     pub fn solve(&self, bonds: &Bonds, mut resultants: Vec<f64>, members: &mut [Vec<f64>]) -> Vec<f64> {
         let mut jump = vec![0.0; bonds.rows];
+        let responses: usize = self.responses.iter().map(|columns| columns.len()).sum();
+        let modes: usize = bonds.members.iter().map(|member| MODES * member.modes.len()).sum();
+        let numbers = responses + modes + 2 * self.rows.len() + self.motions.len();
+        work::each(numbers, 2, size_of::<f64>());
         for (member, v) in bonds.members.iter().zip(&*members) {
             member.jumps.iter().for_each(|of_row| jump[of_row.row] += of_row.of(v));
         }
