@@ -46,7 +46,7 @@ def ranks_of(text):
 
 def arguments(parser):
     parser.add_argument("--kinds", nargs="+", choices=["strong", "weak"], default=["strong", "weak"])
-    parser.add_argument("--ranks", type=ranks_of, nargs="+", default=[[1, 2, 4, 8, 16, 32, 64, 128, 256]], help="1,2,4 or 1 2 4")
+    parser.add_argument("--ranks", type=ranks_of, nargs="+", default=[[1, 2, 4, 8, 16, 32, 64]], help="1,2,4 or 1 2 4")
     parser.add_argument("--strong-level", type=int, default=2)
     parser.add_argument("--cells", type=int, default=2, help="cells along the edge of a subdomain, strong")
     parser.add_argument("--limit", type=float, default=900, help="seconds after which a run is ended")

@@ -1,7 +1,7 @@
 //! How long the phases of a run take on one rank, how long its messages, and how much work is done.
 //!
 //! Wall time. Phases do not nest and leave out the messages inside them, so that all of them together and all messages
-//! together make up the total, but for what belongs to no phase. Work ([`crate::work`]) and counts of messages belong to the phase
+//! together make up the total, but for what belongs to no phase. Work (`src/work.rs`) and counts of messages belong to the phase
 //! that they happen in, or to [`OUTSIDE`].
 
 use std::cell::{Cell, RefCell};
