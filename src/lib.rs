@@ -93,6 +93,7 @@ mod sparse;
 mod tensor;
 mod vector;
 mod verify;
+mod work;
 
 #[cfg(test)]
 mod extension;

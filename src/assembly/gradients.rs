@@ -1,12 +1,16 @@
 //! Gradients of the displacement at the integration points.
 
-use super::visit::{Visited, Visitor, for_each_element};
+use super::visit::{Visited, Visitor, for_each_element, strain_flops};
 use crate::decomposition::Subdomain;
+use crate::work;
 
 /// Hands each element's number and the gradient at each of its points, `[i][j]` the derivative of component `i` by
 /// coordinate `j`.
 pub fn each(subdomain: &Subdomain, u: &[f64], hand: impl FnMut(usize, [[f64; 3]; 3])) {
-    for_each_element(&subdomain.elements, &subdomain.points, &mut Gradients { u, hand });
+    let elements = &subdomain.elements;
+    let (nodes, points) = (elements.kind().nodes(), elements.kind().points());
+    work::each(elements.len(), points * strain_flops(nodes), nodes * size_of::<[f64; 3]>());
+    for_each_element(elements, &subdomain.points, &mut Gradients { u, hand });
 }
 
 struct Gradients<'a, F> {

@@ -1,10 +1,11 @@
 //! `F(u) = D Psi(u)`: internal forces and energy of a subdomain, and energies in the elastic norm.
 
 use super::Region;
-use super::visit::{Visited, Visitor, for_each_element, for_each_point};
+use super::visit::{LAW, Visited, Visitor, for_each_element, for_each_point, strain_flops};
 use crate::element::{Nodal, Point};
 use crate::material::{History, Law};
 use crate::tensor::von_mises;
+use crate::work;
 
 /// What one pass over the elements finds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,6 +57,11 @@ pub struct Answer {
 pub fn add_forces(region: &Region, u: &[f64], forces: &mut [f64]) -> Internal {
     let modulus = region.material.hooke().lambda() + 2.0 * region.material.hooke().shear_modulus();
     let mut pass = Forces { region, u, forces, modulus, sum: Internal::default() };
+    let elements = &region.subdomain.elements;
+    let (nodes, points) = (elements.kind().nodes(), elements.kind().points());
+    // Strain, stress, forces and the size of the terms at each point; displacements are read, forces written.
+    let flops = points * (2 * strain_flops(nodes) + LAW + 14 * nodes);
+    work::each(elements.len(), flops, 2 * nodes * size_of::<[f64; 3]>());
     for_each_element(&region.subdomain.elements, &region.subdomain.points, &mut pass);
     pass.sum
 }

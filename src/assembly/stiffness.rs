@@ -1,19 +1,26 @@
 //! `K_k`: the tangent of a subdomain; at rest it is the elastic stiffness `K_e`.
 
 use super::Region;
-use super::visit::{Visited, Visitor, for_each_element};
+use super::visit::{LAW, Visited, Visitor, for_each_element, strain_flops};
 use crate::element::point::block;
 use crate::material::Law;
 use crate::sparse::pattern::Pattern;
 use crate::tensor::{Tangent, Voigt};
+use crate::work;
 
 /// Overwrites `values` (on `pattern`) by the tangent at the displacement `u`, one step from the committed history, with
 /// the directions of `flow` (`flow`); without them it is the consistent one. Returns the number of elements that yield.
 pub fn assemble(region: &Region, (u, flow): (&[f64], &[Voigt]), pattern: &Pattern, values: &mut [f64]) -> usize {
     values.fill(0.0);
-    let elastic = region.material.hooke().tangent();
+    let (elements, elastic) = (&region.subdomain.elements, region.material.hooke().tangent());
+    let (nodes, points) = (elements.kind().nodes(), elements.kind().points());
+    // At each point w D B has 6 rows of 3 numbers a node, and the blocks of two nodes 9 numbers, of 6 operations each; then the lower
+    // blocks are added to the matrix, which is read and written.
+    let of_point = strain_flops(nodes) + LAW + 6 * 6 * 3 * nodes + 6 * 9 * nodes * nodes;
+    let blocks = 9 * nodes * (nodes + 1) / 2;
+    work::each(elements.len(), points * of_point + blocks, 2 * size_of::<f64>() * blocks);
     let mut assembly = Assembly { region, u, flow, elastic, pattern, values, plastic: 0 };
-    for_each_element(&region.subdomain.elements, &region.subdomain.shape, &mut assembly);
+    for_each_element(elements, &region.subdomain.shape, &mut assembly);
     assembly.plastic
 }
 

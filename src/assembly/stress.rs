@@ -1,9 +1,10 @@
 //! Stresses at the integration points, with their places.
 
 use super::Region;
-use super::visit::{Visited, Visitor, for_each_element};
+use super::visit::{LAW, Visited, Visitor, for_each_element, strain_flops};
 use crate::material::Law;
 use crate::tensor::Voigt;
+use crate::work;
 
 /// An integration point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +20,9 @@ pub struct Sample {
 /// The stresses at `u`, one step from the committed history, element by element.
 pub fn samples(region: &Region, u: &[f64]) -> Vec<Sample> {
     let elements = &region.subdomain.elements;
-    let samples = Vec::with_capacity(elements.kind().points() * elements.len());
+    let (nodes, points) = (elements.kind().nodes(), elements.kind().points());
+    let samples = Vec::with_capacity(points * elements.len());
+    work::each(elements.len(), points * (strain_flops(nodes) + LAW + 6 * nodes), nodes * size_of::<[f64; 3]>());
     let mut stresses = Stresses { region, u, samples };
     for_each_element(elements, &region.subdomain.points, &mut stresses);
     stresses.samples

@@ -5,6 +5,7 @@
 use crate::element::{Element, Nodal, Point, by_kind};
 use crate::mesh::Elements;
 use crate::tensor::Voigt;
+use crate::work;
 
 /// An element of `N` nodes and `P` integration points.
 pub struct Visited<'a, const N: usize, const P: usize> {
@@ -32,7 +33,7 @@ impl<const N: usize, const P: usize> Visited<'_, N, P> {
     }
 }
 
-/// What is done with an element of any kind.
+/// What is done with an element of any kind. Whoever does it books its own work; that of the geometry is booked already.
 pub trait Visitor {
     /// Sees the next element.
     fn see<const N: usize, const P: usize>(&mut self, element: &Visited<N, P>);
@@ -52,11 +53,21 @@ fn show<E: Element<N, P>, const N: usize, const P: usize>(
     visitor: &mut impl Visitor,
 ) {
     let values = &E::values_at_points();
+    // Per point the derivatives of the place, their inverse, and the gradients of the nodes; nodes with their places are read.
+    work::each(elements.len(), P * (2 * 18 * N + 40), N * (size_of::<u32>() + size_of::<[f64; 3]>()));
     for (index, nodes) in elements.of::<N>().iter().enumerate() {
         let points = E::points(&nodes.map(|n| places[n as usize])).expect("elements of a checked mesh have volume");
         visitor.see(&Visited { index, nodes, points, values });
     }
 }
+
+/// Operations of a strain from the displacements of so many nodes ([`Point::strain`]), and of as many nodal forces from a stress.
+pub fn strain_flops(nodes: usize) -> usize {
+    18 * nodes
+}
+
+/// Operations of a material law at a point, more or less: the trial stress, its deviator, and the way back.
+pub const LAW: usize = 60;
 
 /// An integration point, with the strains there of `M` displacements.
 pub struct AtPoint<const M: usize> {
@@ -82,6 +93,8 @@ pub fn for_each_point<const M: usize>(
     displacements: [&[f64]; M],
     see: impl FnMut(AtPoint<M>),
 ) {
+    let points = elements.len() * elements.kind().points();
+    work::each(points, M * strain_flops(elements.kind().nodes()) + LAW, size_of::<[f64; 3]>() * M);
     for_each_element(elements, places, &mut Points { displacements, see });
 }
 

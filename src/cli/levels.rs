@@ -104,6 +104,7 @@ fn complete(solved: &mut Solved, mut told: Vec<String>, table: &PhaseTable) -> V
     summary.imbalance = table.busy.ratio();
     summary.time = table.max_seconds();
     summary.work = table.work();
+    summary.counted = table.counted.clone();
     summary.communication = communication(table);
     summary.time_total = Some(table.total_seconds);
     of_solution

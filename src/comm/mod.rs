@@ -19,6 +19,8 @@ pub mod watched;
 pub mod words;
 pub mod world;
 
+use crate::work;
+
 /// Collective and neighbour communication of one rank. All methods but [`Comm::rank`] and [`Comm::size`] are
 /// collective: every rank calls them in the same order.
 pub trait Comm {
@@ -93,6 +95,7 @@ impl Shares {
 /// the items are spread over the ranks.
 pub fn ordered_sum(comm: &dyn Comm, shares: &Shares, mine: &[f64], width: usize) -> Vec<f64> {
     let rows = comm.gather(mine, &shares.counts(width));
+    work::each(rows.len(), 1, size_of::<f64>());
     let mut sum = vec![0.0; width];
     // Nothing is summed where the width is zero.
     for row in rows.chunks_exact(width.max(1)) {

@@ -36,6 +36,7 @@ use crate::element::Kind;
 use crate::feti::Torn;
 use crate::material::Law;
 use crate::tensor::Voigt;
+use crate::work;
 
 /// Squares of the discretisation error of own elements, and of their stress.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,6 +96,10 @@ fn difference(
 /// element and the values of their shape functions.
 fn squares(region: &Region, samples: &[Sample], rule: &[Place], stress: impl Fn(&[u32], &[f64]) -> Voigt) -> Vec<f64> {
     let elements = &region.subdomain.elements;
+    // At each place of the rule the recovered stress, what it differs by, and its energy.
+    let of_place = 12 * (elements.kind().nodes() + elements.kind().points()) + 30;
+    work::each(elements.len() * rule.len(), of_place, 0);
+    work::each(samples.len(), 0, size_of::<Sample>());
     let of_element = |(nodes, samples): (&[u32], &[Sample])| {
         let at = |place: &Place| {
             let volume: f64 = place.volume.iter().zip(samples).map(|(c, s)| c * s.weight).sum();

@@ -8,6 +8,7 @@ use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::tensor::Voigt;
 use crate::vector::{cross, difference};
+use crate::work;
 
 /// How far polynomials reach from inside to the boundary: to vertices on faces, and from these to edges and corners that
 /// have no neighbour inside.
@@ -88,6 +89,13 @@ impl<'a> Patches<'a> {
         let kind = self.subdomain.elements.kind();
         let width = self.sums_width();
         let mut sums = vec![0.0; width * self.nodes.len()];
+        // Areas of faces, and each sample at each corner: its moments and products.
+        let of_corner = if kind.best_at_centre() { 1 } else { kind.points() } * 2 * width;
+        work::each(
+            self.subdomain.elements.len(),
+            kind.cell().corners() * of_corner + 15 * kind.faces().len(),
+            size_of_val(samples) / self.subdomain.elements.len().max(1),
+        );
         for (nodes, samples) in self.elements().zip(samples.chunks_exact(kind.points())) {
             for face in kind.faces() {
                 let face = &face[..kind.cell().corners_of_face()];
@@ -114,6 +122,8 @@ impl<'a> Patches<'a> {
     /// elements see a boundary from too near for a slope.
     fn fit(&mut self, sums: &[f64]) {
         self.coefficients = vec![0.0; 6 * self.n * self.nodes.len()];
+        // A factor, and six solves with it.
+        work::each(self.nodes.len(), self.n.pow(3) / 3 + 12 * self.n.pow(2), size_of::<f64>() * self.sums_width());
         let of_vertices = sums.chunks_exact(self.sums_width());
         let quadratic = self.subdomain.elements.kind().degree() == 2;
         let mut opened = 0..;
@@ -144,6 +154,7 @@ impl<'a> Patches<'a> {
                 let Some(open) = self.open[self.number(node)] else { continue };
                 let offer = &mut offers[width * open as usize..][..width];
                 for &giver in givers() {
+                    work::add(4 * width, size_of::<f64>() * width);
                     let way = difference(self.point(node), self.point(giver));
                     polynomial::add_moved(self.polynomial(self.number(giver)), way, offer);
                     offer[width - 1] += 1.0;

@@ -1,10 +1,11 @@
 //! What a run tells while it runs: typed events on one side, sinks that show them on the other.
 //!
 //! The stages send [`events::Event`]s to a [`Monitor`]; only rank 0's shows anything. Log lines go through `tracing`, so
-//! the program decides where they end up, as a rule on [`stdout`]. [`timing`] measures phases and messages, [`table`] compares them over the ranks,
+//! the program decides where they end up, as a rule on [`stdout`]. [`timing`] measures phases and messages, [`table`] compares them over the ranks, `counted` what has no noise,
 //! [`trace`] keeps every call.
 //! Nothing here is read back by the numerics.
 
+mod counted;
 pub mod events;
 pub mod json;
 pub mod machine;

@@ -5,7 +5,7 @@
 
 use super::events::{Event, Sink};
 use super::table::{Phase, PhaseTable, Spread};
-use crate::record::counts::{ContactRow, HeldRow, Sizes, Work};
+use crate::record::counts::{ContactRow, Counted, HeldRow, Sizes, Work};
 use crate::record::rows::NewtonRow;
 use crate::record::state::{Errors, Residuals};
 
@@ -142,7 +142,8 @@ fn phase_lines(table: &PhaseTable) -> Vec<String> {
         let Work { flops, bytes } = phase.work;
         let seconds = phase.seconds.max * 1e9;
         let rates = [(flops, seconds), (bytes, seconds), (bytes, phase.calls as f64 * 1e6)];
-        let rates = rates.map(|(work, per)| if work > 0.0 { format!("{:.2}", work / per) } else { String::new() });
+        let rates =
+            rates.map(|(work, per)| if work > 0.0 && per > 0.0 { format!("{:.2}", work / per) } else { String::new() });
         line(&phase.name, phase.calls.to_string(), phase.seconds, rates)
     };
     let messages = |kind: &Phase| {
@@ -162,7 +163,17 @@ fn phase_lines(table: &PhaseTable) -> Vec<String> {
     lines.extend(
         memory.ratio().map(|ratio| format!("{:<29} {:>7} {:>9.0} {ratio:>7.2}", "memory of a rank", "MiB", memory.max)),
     );
+    lines.extend(counted_line(&table.counted));
     lines
+}
+
+/// `busiest rank over the mean      flops 1.04, bytes read 1.03, messages 1.50, bytes sent 1.40`; none where no rank has neighbours.
+fn counted_line(Counted { counts_total, partners, .. }: &Counted) -> Option<String> {
+    let of = counts_total.filter(|_| partners.is_some_and(|partners| partners.busiest > 0.0))?;
+    let kinds =
+        [("flops", of.flops), ("bytes read", of.bytes), ("messages", of.messages), ("bytes sent", of.bytes_sent)];
+    let ratios = kinds.map(|(name, load)| format!("{name} {:.2}", load.busiest / load.mean));
+    Some(format!("{:<29} {}", "busiest rank over the mean", ratios.join(", ")))
 }
 
 fn residual_lines(residuals: &Residuals) -> Vec<String> {
@@ -191,6 +202,7 @@ fn error_line(errors: &Errors) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::counts::{Counts, Load};
 
     #[test]
     fn newton_lines_stand_under_one_header() {
@@ -234,6 +246,26 @@ mod tests {
         assert_eq!(line(row.clone()), "  contact joint            275  upper.zmin against lower.zmax, mortar");
         let floor = ContactRow { master: None, rule: "rigid".into(), ..row };
         assert_eq!(line(floor), "  contact joint            275  upper.zmin, rigid");
+    }
+
+    #[test]
+    fn the_busiest_rank_is_compared_with_the_mean_where_ranks_have_neighbours() {
+        let load = |busiest| Load { busiest, mean: 2.0 };
+        let of = Counts {
+            flops: load(3.0),
+            messages: load(2.0),
+            bytes: load(2.5),
+            bytes_sent: load(5.0),
+            ..Counts::default()
+        };
+        let counted =
+            |partners| Counted { counts_total: Some(of), partners: Some(load(partners)), ..Counted::default() };
+        assert_eq!(
+            counted_line(&counted(2.0)).unwrap(),
+            "busiest rank over the mean    flops 1.50, bytes read 1.25, messages 1.00, bytes sent 2.50"
+        );
+        assert_eq!(counted_line(&counted(0.0)), None);
+        assert_eq!(counted_line(&Counted::default()), None);
     }
 
     #[test]

@@ -4,15 +4,19 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::timing::{Messages, Spent, Timer, peak_rss_mb};
+use super::counted;
+use super::timing::{Messages, OUTSIDE, Spent, Timer, peak_rss_mb};
 use crate::comm::{Comm, Shares, all_gather_text, maximum, ordered_sum};
-use crate::record::counts::Work;
+use crate::record::counts::{Counted, Work};
 
 /// The phases of all ranks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseTable {
-    /// In order of first use: rank 0's, then what only others have. Without messages.
+    /// In order of first use: rank 0's, then what only others have; last [`OUTSIDE`]. Without messages.
     pub phases: Vec<Phase>,
+    /// What ranks did in each.
+    #[serde(flatten)]
+    pub counted: Counted,
     /// Messages of each kind, waiting for other ranks included. None of a kind that was not used.
     pub communication: Vec<Phase>,
     /// Seconds of a rank outside messages.
@@ -55,21 +59,27 @@ impl Spread {
 impl PhaseTable {
     /// Compares the timers of all ranks. Collective.
     pub fn gather(comm: &dyn Comm, timer: &Timer) -> Self {
+        // Before the messages of this table itself.
+        let (of_phases, partners) = (timer.spent(), timer.partners());
         let mut names: Vec<String> = Vec::new();
         let messages = Messages::ALL.map(|kind| (kind.name(), timer.traffic(kind)));
         let total = timer.total_seconds();
-        for list in all_gather_text(comm, &timer.names().join("\n")) {
+        let mine: Vec<&str> = of_phases.iter().map(|(name, _)| *name).filter(|name| *name != OUTSIDE).collect();
+        for list in all_gather_text(comm, &mine.join("\n")) {
             for name in list.lines() {
                 if !names.iter().any(|known| known == name) {
                     names.push(name.to_owned());
                 }
             }
         }
+        names.push(OUTSIDE.to_owned());
         let waiting: f64 = messages.iter().map(|(_, traffic)| traffic.seconds).sum();
-        let mut spent: Vec<Spent> = names.iter().map(|name| timer.spent(name)).collect();
+        let of = |name: &String| of_phases.iter().find(|(known, _)| known == name).map(|(_, spent)| *spent);
+        let mut spent: Vec<Spent> = names.iter().map(|name| of(name).unwrap_or_default()).collect();
+        let counted = counted::gather(comm, &names, &spent, partners);
         spent.extend(messages.map(|(_, traffic)| {
             let work = Work { flops: 0.0, bytes: traffic.bytes as f64 };
-            Spent { calls: traffic.calls, seconds: traffic.seconds, work }
+            Spent { calls: traffic.calls, seconds: traffic.seconds, work, ..Spent::default() }
         }));
         // One collective for all: the smallest is the largest of the negatives.
         let spreads = spent.iter().map(|s| s.seconds).chain([total - waiting, peak_rss_mb().unwrap_or(f64::NAN)]);
@@ -98,7 +108,7 @@ impl PhaseTable {
         let mut communication = rows.split_off(phases);
         communication.retain(|kind| kind.calls > 0);
         let [busy, memory_mb] = [(); 2].map(|()| spreads.next().expect("two more were handed in"));
-        Self { phases: rows, communication, busy, memory_mb, total_seconds }
+        Self { phases: rows, counted, communication, busy, memory_mb, total_seconds }
     }
 
     /// Seconds of each phase on the slowest rank, by name.
@@ -117,6 +127,7 @@ impl PhaseTable {
 mod tests {
     use super::*;
     use crate::comm::threads;
+    use crate::work;
 
     #[test]
     fn phases_are_compared_over_the_ranks() {
@@ -128,14 +139,14 @@ mod tests {
                 timer.add("contact", 2.0);
             }
             assert_eq!(timer.time("assembly", || 7), 7);
-            timer.count("assembly", 10.0, comm.rank() as f64);
+            timer.time("assembly", || work::add(10, comm.rank()));
             timer.messages(Messages::Exchange, 8, || ());
             PhaseTable::gather(comm, &timer)
         });
         assert!(tables.iter().all(|t| *t == tables[0]));
         let names: Vec<&str> = tables[0].phases.iter().map(|p| &p.name[..]).collect();
-        assert_eq!(names, ["factorisation", "assembly", "contact"]);
-        let [factorisation, assembly, contact] = &tables[0].phases[..] else { panic!("three phases") };
+        assert_eq!(names, ["factorisation", "assembly", "contact", OUTSIDE]);
+        let [factorisation, assembly, contact, _] = &tables[0].phases[..] else { panic!("three phases, and the rest") };
         assert_eq!((factorisation.calls, factorisation.seconds), (2, Spread { max: 3.5, min: 1.5 }));
         assert_eq!((contact.calls, contact.seconds.max, contact.seconds.ratio()), (1, 2.0, None));
         assert_eq!(tables[0].max_seconds()["factorisation"], 3.5);

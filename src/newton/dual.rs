@@ -58,7 +58,6 @@ impl<'a> Dual<'_, 'a> {
     /// `y = F x`.
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.timer.time("dual operator", || self.operator.apply(x, y));
-        self.timer.count("dual operator", 0.0, self.operator.inverse.bytes_per_solve());
         (self.alive)(self.operator.applications());
     }
 
@@ -67,7 +66,6 @@ impl<'a> Dual<'_, 'a> {
         let Some(preconditioner) = &mut self.preconditioner else { return false };
         let apply = |r: &[f64], z: &mut [f64]| self.timer.time("preconditioner", || preconditioner.apply(r, z));
         self.operator.precondition(r, z, apply);
-        self.timer.count("preconditioner", 0.0, preconditioner.bytes_per_apply());
         true
     }
 

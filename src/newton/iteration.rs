@@ -371,7 +371,7 @@ fn first_iterate(
     stood: Option<SolverState>,
     timer: &Timer,
 ) -> (Iterate, Option<Outcome>) {
-    let state = problem.evaluate(&u);
+    let state = timer.time("internal forces", || problem.evaluate(&u));
     let refusal = match stood {
         Some(stood) => solver.resume(problem, stood, timer).err(),
         None => {
@@ -380,9 +380,9 @@ fn first_iterate(
         }
     };
     if let Some(kept) = kept {
-        lambda = solver.expect(problem, &state, kept);
+        lambda = timer.time("coarse set-up", || solver.expect(problem, &state, kept));
     }
-    let residuals = problem.residuals(&u, &state, &lambda);
+    let residuals = timer.time("residuals", || problem.residuals(&u, &state, &lambda));
     let iterate = Iterate { u, lambda, state, residuals, errors: None, ended_by_accuracy: false };
     (iterate, refusal.map(Outcome::Singular))
 }

@@ -18,6 +18,7 @@ use crate::feti::inverse::kernel::RigidModes;
 use crate::material::{Law, Material};
 use crate::model::Discrete;
 use crate::model::history::Conditions;
+use crate::work;
 
 /// What one rank holds of the problem.
 pub struct TornProblem<'a> {
@@ -122,9 +123,10 @@ impl TornProblem<'_> {
         for (own, region) in self.regions().iter().enumerate() {
             let found = internal::add_forces(region, &u[own], &mut forces[own]);
             let Terms { energy, force_squares } = found.terms;
-            let work = dot(&self.loads[own], &u[own]);
+            let worked = dot(&self.loads[own], &u[own]);
+            work::each(u[own].len(), 2, size_of::<f64>());
             yielding.push(found.plastic);
-            partial.extend([found.energy, work, found.plastic as f64, energy, force_squares]);
+            partial.extend([found.energy, worked, found.plastic as f64, energy, force_squares]);
         }
         let sum = self.space.sum(&partial, 5);
         State {

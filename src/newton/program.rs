@@ -197,7 +197,7 @@ impl Programs {
         limits: Limits,
     ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
-        let rows = self.take_face(dual.coarse, lambda.len());
+        let rows = dual.timer.time("coarse set-up", || self.take_face(dual.coarse, lambda.len()));
         let mut face = DualFace { dual, constraints: problem.constraints, resultants, rows };
         let mut solver = Pcpg::with(&space, directions);
         let report = solver.solve(&mut face, &mut lambda, &mut residual, &limits);
@@ -219,10 +219,11 @@ impl Programs {
     ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
         let bounded = problem.constraints.laws().may_open();
-        let rows = self.take_face(dual.coarse, bounded.len());
+        let rows = dual.timer.time("coarse set-up", || self.take_face(dual.coarse, bounded.len()));
         let mut kept = rows.kept().to_vec();
         let mut face = DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants, rows };
-        if !face.complete(&mut kept) {
+        let timer = face.dual.timer;
+        if !timer.time("coarse set-up", || face.complete(&mut kept)) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
             let (lambda, balanced) = (Vec::new(), Vec::new());
             return DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest: None };

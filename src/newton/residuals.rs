@@ -9,6 +9,7 @@ use super::committed::Sizes;
 use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::constraint::Kind;
 use crate::feti::Torn;
+use crate::work;
 
 /// Relative residuals; all are zero for the exact solution. The sizes that they refer to are never less than the largest ones
 /// of former increments.
@@ -147,6 +148,7 @@ impl TornProblem<'_> {
         let mut partial = Vec::with_capacity(N * self.subdomains.len());
         for (own, copies) in self.constraints.copies.iter().enumerate() {
             for vector in vectors {
+                work::each(vector[own].len(), 2, size_of::<f64>());
                 let mut square = vector[own].iter().map(|x| x * x).sum::<f64>();
                 for &(node, count) in copies {
                     let at = 3 * node as usize;

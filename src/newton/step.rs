@@ -297,7 +297,6 @@ impl<'a> StepSolver<'a> {
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.
     fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64], timer: &Timer) {
         timer.time("dual operator", || self.operator.respond(x, torn, y));
-        timer.count("dual operator", 0.0, self.operator.inverse.bytes_per_solve());
     }
 }
 

@@ -27,6 +27,8 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
+use crate::work;
+
 /// How a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -98,6 +100,7 @@ impl Limits {
 
 /// `y = y + a x`.
 fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+    work::each(x.len(), 2, size_of::<f64>());
     for (y, x) in y.iter_mut().zip(x) {
         *y += a * x;
     }

@@ -1,6 +1,10 @@
 //! How large a problem is, and what solving it took.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
+
+pub use crate::work::Work;
 
 /// Sizes of the problem, in the paper's way of counting rows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -76,15 +80,6 @@ pub struct Counters {
     pub factorisations: Option<u64>,
 }
 
-/// What a phase does at least, where that is known.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Work {
-    /// Additions and multiplications.
-    pub flops: f64,
-    /// Bytes of matrices read.
-    pub bytes: f64,
-}
-
 /// Messages of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CommunicationRow {
@@ -94,4 +89,44 @@ pub struct CommunicationRow {
     pub seconds: f64,
     /// Handed in by all ranks together.
     pub megabytes: f64,
+}
+
+/// A number of each rank, over all of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Load {
+    /// Of the rank that has most.
+    pub busiest: f64,
+    /// Mean of all ranks.
+    pub mean: f64,
+}
+
+/// What a rank does and says in a phase.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Counts {
+    /// Additions and multiplications, see [`Work`].
+    pub flops: Load,
+    /// Bytes read, see [`Work`].
+    pub bytes: Load,
+    /// Messages sent to single ranks: one for each partner of an exchange, one for each other rank that an all-to-all has
+    /// something for.
+    pub messages: Load,
+    /// Calls that all ranks take part in: gathers, broadcasts, all-to-alls.
+    pub collectives: Load,
+    /// Bytes handed in for other ranks.
+    pub bytes_sent: Load,
+    /// Bytes that came from other ranks.
+    pub bytes_received: Load,
+    /// Bytes of the longest single message, or of the longest result of a collective call.
+    pub largest_message: Load,
+}
+
+/// What ranks did, free of noise.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Counted {
+    /// By phase; what is in none is under `outside phases`.
+    pub counts: BTreeMap<String, Counts>,
+    /// Of the whole run. The busiest rank is that of the whole, which need not be the busiest in any phase.
+    pub counts_total: Option<Counts>,
+    /// Other ranks that a rank exchanges with.
+    pub partners: Option<Load>,
 }

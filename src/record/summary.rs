@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::counts::{CommunicationRow, ContactRow, Counters, HeldRow, Sizes, Work};
+use super::counts::{CommunicationRow, ContactRow, Counted, Counters, HeldRow, Sizes, Work};
 use super::rows::{CascadeRow, NewtonRow, StepRow};
 use super::state::State;
 
@@ -50,6 +50,9 @@ pub struct Summary {
     pub time: BTreeMap<String, f64>,
     /// What phases do at least, all ranks together, where that is known.
     pub work: BTreeMap<String, Work>,
+    /// What ranks did, free of noise.
+    #[serde(flatten)]
+    pub counted: Counted,
     /// Messages by kind.
     pub communication: BTreeMap<String, CommunicationRow>,
     /// Sum over the ranks of their largest resident memory, in MiB.

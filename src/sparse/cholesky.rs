@@ -7,6 +7,7 @@ use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
@@ -17,6 +18,7 @@ use faer::{Mat, Par, Side, Spec};
 pub use super::number::{Numbers, Precision, WIDTH};
 use super::pattern::Pattern;
 use super::supernodes;
+use crate::work;
 
 /// Sparsity of a symmetric matrix: its lower triangle by columns, rows ascending.
 #[derive(Clone, Copy)]
@@ -117,6 +119,7 @@ impl Analysis {
                 lower[(i, k)] = factor.get(at);
             }
         }
+        work::add(2 * count * count * count, size_of::<f64>() * count * count);
         &lower * lower.transpose()
     }
 
@@ -201,6 +204,7 @@ impl Workspace {
         values: &[f64],
         factor: &mut Factor,
     ) -> Result<(), Breakdown> {
+        work::add(analysis.flops() as usize, size_of_val(values) + factor.bytes());
         let stack = MemStack::new(&mut self.buffer);
         match factor {
             Factor::Double(factor) => factorise(analysis, lower, values, factor, stack),
@@ -218,6 +222,7 @@ impl Workspace {
         // Only a matrix without unknowns is not analysed by supernodes.
         let (SymbolicCholeskyRaw::Supernodal(panels), Some(order)) = (symbolic.raw(), symbolic.perm()) else { return };
         let order = order.arrays().0;
+        book_solve(panels, factor, 1);
         match factor {
             Factor::Double(factor) => {
                 let Scratch { numbers, panel, .. } = &mut self.double;
@@ -239,10 +244,12 @@ impl Workspace {
         }
     }
 
-    /// `x = A^-1 x` for [`WIDTH`] vectors, `WIDTH` numbers an unknown. Each gets the bits that it would get beside others.
-    pub fn solve_wide(&mut self, Analysis(symbolic): &Analysis, factor: &Factor, x: &mut [f64]) {
+    /// `x = A^-1 x` for [`WIDTH`] vectors, `WIDTH` numbers an unknown, of which the first `count` matter. Each gets the bits that it
+    /// would get beside others.
+    pub fn solve_wide(&mut self, Analysis(symbolic): &Analysis, factor: &Factor, x: &mut [f64], count: usize) {
         let (SymbolicCholeskyRaw::Supernodal(panels), Some(order)) = (symbolic.raw(), symbolic.perm()) else { return };
         let (order, (x, _)) = (order.arrays().0, x.as_chunks_mut::<WIDTH>());
+        book_solve(panels, factor, count);
         match factor {
             Factor::Double(factor) => {
                 let Scratch { wide: unknowns, wide_panel: panel, .. } = &mut self.double;
@@ -266,6 +273,12 @@ impl Workspace {
             }
         }
     }
+}
+
+/// Each entry is multiplied and added on the way forward and on the way back, and all that is stored is read twice.
+fn book_solve(panels: &SymbolicSupernodalCholesky<u32>, factor: &Factor, vectors: usize) {
+    let entries: usize = (0..panels.n_supernodes()).map(|s| supernodes::entries(panels, s)).sum();
+    work::add(4 * entries * vectors, 2 * factor.bytes());
 }
 
 fn factorise<T: RealField + Copy>(

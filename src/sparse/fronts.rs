@@ -8,7 +8,8 @@ use faer::sparse::linalg::cholesky::SymbolicCholeskyRaw;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 
 use super::cholesky::{Analysis, Factor};
-use super::supernodes::fronts as supernodes;
+use super::supernodes::{entries as of_supernode, fronts as supernodes};
+use crate::work;
 
 /// The elimination tree of an analysis, shared out over ranks.
 pub struct Fronts {
@@ -110,6 +111,8 @@ impl Fronts {
         let Factor::Double(values) = factor else { panic!("factors that ranks share are in double precision") };
         let is_shared = self.own.len() > 1;
         let mine = if is_shared { rank } else { 0 };
+        let entries: usize = self.own[mine].iter().chain(&self.common).map(|&s| of_supernode(panels, s as usize)).sum();
+        work::each(entries, 4, 2 * size_of::<f64>());
         self.x.clear();
         self.x.extend(order.iter().map(|&k| x[k as usize]));
 

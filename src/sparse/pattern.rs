@@ -3,6 +3,10 @@
 //! Depends on the connectivity only, so congruent subdomains share one.
 
 use crate::mesh::Elements;
+use crate::work;
+
+/// Bytes of an entry: its value and its row.
+const ENTRY: usize = size_of::<f64>() + size_of::<u32>();
 
 /// Lower triangle by columns, diagonal first; entries of one node lie together in every column.
 #[derive(Debug, PartialEq, Eq)]
@@ -80,6 +84,7 @@ impl Pattern {
 
     /// `y += A x` for the symmetric matrix with these lower values.
     pub fn multiply_add(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
+        work::each(self.rows.len(), 4, ENTRY);
         for column in 0..self.dofs() {
             let range = self.column_begin[column] as usize..self.column_begin[column + 1] as usize;
             let (rows, entries) = (&self.rows[range.clone()], &values[range]);
@@ -96,6 +101,7 @@ impl Pattern {
     /// The largest difference of two matrices' entries, relative to the geometric mean of the first one's diagonals; NaN if
     /// one is not finite.
     pub fn difference(&self, values: &[f64], others: &[f64]) -> f64 {
+        work::each(self.rows.len(), 5, 2 * ENTRY);
         let diagonal = self.diagonal(values);
         let mut largest = 0.0;
         for column in 0..self.dofs() {

@@ -80,6 +80,12 @@ impl<T: Number> WithSimd for SolveWide<'_, T> {
     }
 }
 
+/// Entries of the factor in a supernode: those of the triangle, and of the rows below it.
+pub(super) fn entries(symbolic: &SymbolicSupernodalCholesky<u32>, s: usize) -> usize {
+    let width = (symbolic.supernode_end()[s] - symbolic.supernode_begin()[s]) as usize;
+    width * (width + 1) / 2 + width * symbolic.supernode(s).pattern().len()
+}
+
 /// How far ahead of its use the factor is asked for, in bytes: columns are too short for the hardware to foresee.
 const AHEAD: usize = 4096;
 

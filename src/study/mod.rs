@@ -109,8 +109,8 @@ pub fn solve(
 ) -> Result<Solved, StudyError> {
     let started = SystemTime::now();
     let Discrete { decomposition, constraints, .. } = discrete;
-    let connection = Interconnection::new(comm, decomposition, constraints);
-    let sums = NodeSums::new(comm, decomposition);
+    let connection = timer.time("interfaces", || Interconnection::new(comm, decomposition, constraints));
+    let sums = timer.time("interfaces", || NodeSums::new(comm, decomposition));
     let (conditions, stages) = model::history::stages(scene, discrete, &|| connection.gather.zeros());
     let solver = solver::step_solver(scene, discrete, comm, &connection, &stages, timer)?;
     let mut problem = TornProblem::new(discrete, &connection, &sums, conditions);
@@ -188,7 +188,7 @@ fn follow(
         }
         let outcome = newton.outcome().cloned();
         if outcome == Some(Outcome::Converged) {
-            recorder.record(newton);
+            timer.time("records", || recorder.record(newton));
         }
         match newton.advance(timer) {
             Next::Increment => {}
@@ -201,7 +201,7 @@ fn follow(
                 let failure = outcome.filter(|outcome| *outcome != Outcome::Converged);
                 if failure.is_some() && newton.reached().is_none() {
                     // Nothing ever converged: what there is is better than nothing.
-                    recorder.record(newton);
+                    timer.time("records", || recorder.record(newton));
                 }
                 return Ok(failure.map(|outcome| (at, outcome)));
             }

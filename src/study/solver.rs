@@ -42,7 +42,7 @@ pub(super) fn step_solver<'a>(
     };
     let schur = |precision| {
         let boundaries = gather.boundaries();
-        let alike = alike(comm, subdomains, &boundaries);
+        let alike = timer.time("symbolic analysis", || alike(comm, subdomains, &boundaries));
         timer.time("symbolic analysis", || Schur::new(&symbolic, boundaries, &alike, precision))
     };
     let schur = match scene.solver.preconditioner {
@@ -50,12 +50,14 @@ pub(super) fn step_solver<'a>(
         scene::Preconditioner::Lumped => Some(schur(None)),
         scene::Preconditioner::Dirichlet => Some(schur(Some(precision))),
     };
+    let shares = &decomposition.shares;
     let preconditioner =
-        schur.map(|schur| Preconditioner::new(comm, &decomposition.shares, constraints, gather, schur));
+        schur.map(|schur| timer.time("interfaces", || Preconditioner::new(comm, shares, constraints, gather, schur)));
     timer.time("coarse set-up", || model::held::at_all_stages(scene, discrete, &mut coarse, space, modes, stages))?;
     let hybrid = timer.time("clusters", || Hybrid::of_clusters(connection, decomposition, constraints))?;
-    let pinnable = pinnable::unknowns(constraints, subdomains, modes);
-    let inverse = Inverse::new(symbolic, precision, twins(comm, subdomains), pinnable);
+    let pinnable = timer.time("symbolic analysis", || pinnable::unknowns(constraints, subdomains, modes));
+    let twins = timer.time("symbolic analysis", || twins(comm, subdomains));
+    let inverse = Inverse::new(symbolic, precision, twins, pinnable);
     let operator = DualOperator::new(inverse, hybrid, gather);
     Ok(StepSolver::new(operator, coarse, preconditioner, programs(scene)))
 }

@@ -1,8 +1,11 @@
 //! Bodies of several materials against closed forms, two bodies in contact, and each other.
 
 use crate::comm::threads;
-use crate::fixture::{RANKS, quarters};
+use crate::fixture::{RANKS, clustered, quarters, two_bricks};
+use crate::monitor::metered::Metered;
+use crate::monitor::table::PhaseTable;
 use crate::monitor::timing::Timer;
+use crate::record::counts::Counted;
 use crate::record::summary::Summary;
 use crate::scene::Scene;
 
@@ -182,4 +185,62 @@ fn one_material_named_for_each_volume_is_one_material() {
     let pairs = bar(PAIRS, &[&common[..], &[same]].concat());
     assert!(pairs.summary.sizes.subdomains > whole.summary.sizes.subdomains);
     assert_same_energy(&pairs, &whole);
+}
+
+/// Phases that are local to subdomains, or whose sums are: as much work on any ranks.
+const LOCAL: [&str; 9] = [
+    "assembly",
+    "factorisation",
+    "factorisation of the interior",
+    "dual operator",
+    "inner products",
+    "internal forces",
+    "residuals",
+    "certificate",
+    "error estimate",
+];
+
+/// What ranks did in a solve.
+fn count(scene: &Scene, ranks: usize) -> Counted {
+    let tables = threads::run(ranks, |comm| {
+        let timer = Timer::start();
+        let comm = &Metered::new(comm, &timer);
+        let discrete = crate::model::discrete::discretise(scene, comm).expect("the scene has a discrete problem");
+        super::solve(scene, &discrete, comm, super::Begin::Rest, &timer, &mut ()).expect("it is held");
+        PhaseTable::gather(comm, &timer)
+    });
+    tables.into_iter().next().expect("rank 0").counted
+}
+
+#[test]
+fn counts_have_no_noise_and_local_work_does_not_depend_on_the_ranks() {
+    // No two parts are congruent, so that no rank can share factors.
+    let scene = two_bricks(&["decomposition.subdomains=9", "load.top.traction=[0.0, 0.0, -0.35]"]);
+    let alone = count(&scene, 1);
+    assert_eq!(alone.counts_total.map(|of| (of.messages.busiest, of.bytes_sent.busiest)), Some((0.0, 0.0)));
+    for ranks in RANKS {
+        let [once, again] = [(); 2].map(|()| count(&scene, ranks));
+        assert_eq!(once, again, "{ranks} ranks");
+        let sum = |of: &Counted, phase: &str| ranks as f64 * of.counts[phase].flops.mean;
+        for phase in LOCAL {
+            let (found, expected) = (sum(&once, phase), alone.counts[phase].flops.mean);
+            assert!(expected > 0.0, "{phase} has no count");
+            // A mean is rounded.
+            assert!((found / expected - 1.0).abs() < 1e-14, "{phase} on {ranks} ranks: {found} {expected}");
+        }
+        if ranks > 1 {
+            assert!(once.counts_total.is_some_and(|total| total.messages.busiest > 0.0));
+        }
+    }
+}
+
+/// Every phase that takes time and computes has a count.
+#[test]
+fn all_phases_of_a_solve_are_counted() {
+    let Counted { counts, .. } = count(&clustered(), 2);
+    let idle: Vec<&str> = counts.iter().filter(|(_, of)| of.flops.busiest == 0.0).map(|(name, _)| &name[..]).collect();
+    // Searches and orderings.
+    assert_eq!(idle, ["interfaces", "symbolic analysis"]);
+    let reads = |name: &str| counts[name].bytes.busiest > 0.0;
+    assert!(counts.keys().filter(|name| !idle.contains(&&name[..])).all(|name| reads(name)));
 }

@@ -126,6 +126,28 @@ fn assert_contract(summary: &Value) {
     assert_eq!(summary["provenance"]["scene"], Value::Null, "it is in the result file, and long");
     let time = summary["time"].as_object().unwrap();
     assert!(time.len() > 3 && time.values().all(Value::is_number), "{time:?}");
+    assert_counts(summary);
+}
+
+/// On two ranks, each the other's partner.
+fn assert_counts(summary: &Value) {
+    let counts = summary["counts"].as_object().unwrap();
+    assert!(counts.keys().eq(summary["time"].as_object().unwrap().keys()), "each phase has counts");
+    let keys = ["bytes", "bytes_received", "bytes_sent", "collectives", "flops", "largest_message", "messages"];
+    for (phase, of) in counts.iter().chain([(&"all".to_owned(), &summary["counts_total"])]) {
+        assert_eq!(of.as_object().unwrap().len(), keys.len(), "{phase}: {of}");
+        for key in keys {
+            let [busiest, mean] = ["busiest", "mean"].map(|of_ranks| of[key][of_ranks].as_f64().unwrap());
+            assert!(busiest >= mean && mean >= busiest / 2.0, "{phase}, {key}: {busiest} {mean}");
+        }
+    }
+    for (phase, work) in summary["work"].as_object().unwrap() {
+        assert_eq!(work["flops"].as_f64().unwrap(), 2.0 * counts[phase]["flops"]["mean"].as_f64().unwrap(), "{phase}");
+    }
+    // One message to the other rank in each application of F.
+    let messages = &counts["dual operator"]["messages"]["busiest"];
+    assert_eq!(messages.as_f64(), summary["hessian_multiplications"].as_u64().map(|count| count as f64));
+    assert_eq!(summary["partners"], serde_json::json!({ "busiest": 1.0, "mean": 1.0 }));
 }
 
 #[test]

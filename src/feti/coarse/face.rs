@@ -22,11 +22,12 @@ use faer::{ColRef, Mat};
 
 use super::Coarse;
 use super::base::Base;
-use super::factor::Blocks;
+use super::factor::{Block, Blocks};
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
 use crate::span::complement;
 use crate::vector::{dot, length};
+use crate::work;
 
 /// So many clusters are few: a factor for each set of contacts takes less time than the iterations that oblique projectors take more.
 const FEW: usize = 1000;
@@ -152,6 +153,7 @@ impl CoarseFace {
         // With v = L'x: |x - G_A'v|^2 = x'x - 2 v'G_A x + v'G_A G_A'v, where G_B G_B'v = G_B x; and G_B r = 0.
         let [inside, contacts, beside] = &parts;
         let resisted = dot(&motion, multiply(&self.contacts, &motion));
+        work::each(motion.len(), 6, size_of::<f64>());
         let square = sums[0] - dot(&motion, inside) - 2.0 * dot(&motion, contacts) + resisted;
         let product = sums[1] - dot(&motion, beside);
         // Not `max`: NaN must stay NaN.
@@ -237,6 +239,7 @@ const BALANCED: f64 = 1e-10;
 
 /// The products of `x` with some vectors.
 fn products(vectors: &[Vec<f64>], x: &[f64]) -> Vec<f64> {
+    work::each(vectors.len() * x.len(), 2, size_of::<f64>());
     vectors.iter().map(|vector| dot(vector, x)).collect()
 }
 
@@ -249,12 +252,14 @@ fn combination(vectors: &[Vec<f64>], shares: &[f64]) -> Vec<f64> {
 
 /// `y -= factor x`.
 fn subtract(factor: f64, x: &[f64], y: &mut [f64]) {
+    work::each(x.len(), 2, size_of::<f64>());
     y.iter_mut().zip(x).for_each(|(y, x)| *y -= factor * x);
 }
 
 /// The product of lower blocks and a vector.
 fn multiply(blocks: &Blocks, x: &[f64]) -> Vec<f64> {
     let mut y = vec![0.0; x.len()];
+    work::each(blocks.len(), 4 * MODES * MODES, size_of::<Block>());
     for (&(row, column), block) in blocks {
         for i in 0..MODES {
             for j in 0..MODES {

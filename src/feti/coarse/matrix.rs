@@ -10,6 +10,7 @@ use crate::constraint::{Constraints, Kind, Row};
 use crate::decomposition::{Clusters, Subdomain};
 use crate::feti::dual::gather::Gather;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
+use crate::work;
 
 /// Which rows of `B`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,6 +150,7 @@ impl Matrix {
     pub fn resultants(&self, rows: Rows, x: impl Fn(usize) -> f64) -> impl Iterator<Item = [f64; MODES]> {
         self.acting[rows as usize].iter().map(move |acting| {
             let mut sum = [0.0; MODES];
+            work::each(acting.len(), 2 * MODES, size_of::<Acting>());
             for Acting { row, modes } in acting {
                 let x = x(*row as usize);
                 sum.iter_mut().zip(modes).for_each(|(s, g)| *s += g * x);
@@ -159,11 +161,13 @@ impl Matrix {
 
     /// `x += factor G'a` in some rows, in those of them that are `wanted`.
     pub fn add_transpose(&self, rows: Rows, wanted: impl Fn(usize) -> bool, factor: f64, a: &[f64], x: &mut [f64]) {
-        let a = a.as_chunks::<MODES>().0;
+        let (a, mut slots) = (a.as_chunks::<MODES>().0, 0);
         for &row in self.moving[rows as usize].iter().filter(|row| wanted(**row as usize)) {
+            slots += self.slots(row as usize).len();
             let of_slot = |slot: usize| dot(&self.modes[slot], &a[self.cluster[slot] as usize]);
             x[row as usize] += factor * self.slots(row as usize).map(of_slot).sum::<f64>();
         }
+        work::each(slots, 2 * MODES, size_of::<[f64; MODES]>() + size_of::<u32>());
     }
 
     /// Blocks of `G W G'` of some rows with the diagonal `W`: for each own subdomain its cluster, and what it adds to the lower blocks
@@ -184,6 +188,7 @@ impl Matrix {
                     if column as usize > cluster {
                         continue;
                     }
+                    work::add(2 * MODES * MODES, size_of::<[f64; MODES]>());
                     let at = columns.iter().position(|c| *c == column).unwrap_or_else(|| {
                         blocks.push([0.0; MODES * MODES]);
                         columns.push(column);

@@ -20,6 +20,7 @@ use crate::decomposition::{Clusters, Decomposition};
 use crate::feti::dual::Interconnection;
 use crate::feti::dual::levels::Tree;
 use crate::feti::inverse::kernel::MODES;
+use crate::work;
 
 /// The constraints leave a rigid motion free.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -252,6 +253,7 @@ impl<'a> Coarse<'a> {
             mine.extend_from_slice(&partial[width * own..][..width]);
         }
         let all = self.over_clusters(&mine, length);
+        work::each(all.len(), 1, size_of::<f64>());
         let mut sums = vec![0.0; width];
         let mut parts = [(); 3].map(|()| Vec::with_capacity(MODES * self.clusters.total()));
         for of_cluster in all.chunks_exact(length) {

@@ -8,6 +8,7 @@ use std::cell::RefCell;
 use crate::comm::{Comm, Shares};
 use crate::constraint::{Constraints, Entry};
 use crate::feti::Torn;
+use crate::work;
 
 /// The constraint matrix B of one rank.
 pub struct Gather<'a> {
@@ -108,6 +109,7 @@ impl<'a> Gather<'a> {
 
     /// `local += factor B_s' rows` for one own subdomain.
     pub fn add_transpose_one(&self, own: usize, factor: f64, rows: &[f64], local: &mut [f64]) {
+        work::each(self.entries[own].len(), 2, size_of::<Entry>());
         for entry in &self.entries[own] {
             local[entry.dof as usize] += factor * entry.value * rows[entry.row as usize];
         }
@@ -116,6 +118,7 @@ impl<'a> Gather<'a> {
     /// `rows = B torn`. One neighbour exchange.
     pub fn apply(&self, torn: &Torn, rows: &mut [f64]) {
         let fill = |own: usize, slots: &mut [f64]| {
+            work::each(self.entries[own].len(), 2, size_of::<Entry>());
             for entry in &self.entries[own] {
                 slots[entry.slot as usize] += entry.value * torn[own][entry.dof as usize];
             }

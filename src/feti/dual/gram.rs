@@ -2,6 +2,7 @@
 
 use crate::constraint::{Constraints, Term};
 use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
+use crate::work;
 
 /// The matrix of some rows that share nodes. Rows that are not kept take no part.
 pub struct Gram {
@@ -164,6 +165,7 @@ impl Gram {
     pub fn factorise(&mut self, weight: impl Fn(SlotUnknown, SlotUnknown) -> f64, kept: impl Fn(usize) -> bool) {
         self.kept.iter_mut().zip(&self.rows).for_each(|(k, &row)| *k = kept(row));
         self.values.fill(0.0);
+        work::each(self.products.len(), 2, size_of::<Product>());
         for Product { entry, factors, value } in &self.products {
             let [a, b] = factors.map(|k| self.sites[k as usize]);
             self.values[*entry as usize] += value * weight(a, b);
@@ -198,6 +200,7 @@ impl Gram {
 
     /// `y -= B B' x` on its rows, kept or not, where `W` has no blocks; `y` is by place.
     pub fn subtract_product(&self, x: &[f64], y: &mut [f64]) {
+        work::each(self.products.len(), 4, size_of::<Product>());
         for Product { entry, value, .. } in &self.products {
             let [a, b] = [&self.row_index, &self.column_index].map(|index| index[*entry as usize] as usize);
             y[a] -= value * x[self.rows[b]];

@@ -10,6 +10,7 @@ use crate::constraint::Constraints;
 use crate::feti::Torn;
 use crate::simd::vectorised;
 use crate::vector::dot;
+use crate::work;
 
 /// Sums of an inner product side by side.
 const LANES: usize = 8;
@@ -55,6 +56,7 @@ impl<'a> RowSpace<'a> {
         let mut partial = Vec::with_capacity(self.owned.len() * pairs.len());
         let (groups, others) = pairs.as_chunks::<TOGETHER>();
         for rows in &self.owned {
+            work::each(rows.len() * pairs.len(), 2, 2 * size_of::<f64>());
             groups.iter().for_each(|group| partial.extend(products(rows, group)));
             others.iter().for_each(|pair| partial.extend(products(rows, &[*pair])));
         }
@@ -86,6 +88,7 @@ impl<'a> RowSpace<'a> {
 
     /// Euclidean norm of a torn vector. Collective.
     pub fn norm(&self, x: &Torn) -> f64 {
+        x.iter().for_each(|x| work::each(x.len(), 2, size_of::<f64>()));
         let squares: Vec<f64> = x.iter().map(|x| dot(x, x)).collect();
         self.sum(&squares, 1)[0].sqrt()
     }

@@ -195,11 +195,6 @@ impl Factors {
         self.stamps[own]
     }
 
-    /// Bytes of factors that one [`Factors::solve`] reads, forward and backward.
-    pub fn bytes_per_solve(&self) -> f64 {
-        self.factors.sum(|factor| 2.0 * factor.bytes() as f64)
-    }
-
     /// `columns = K^+ columns` for several vectors of an own subdomain, one behind the other.
     pub fn solve_columns(&mut self, own: usize, columns: &mut [f64]) {
         let cholesky = &self.symbolic[own].cholesky;
@@ -210,7 +205,8 @@ impl Factors {
             for (lane, column) in columns.chunks_exact(n).enumerate() {
                 panel.iter_mut().zip(column).for_each(|(panel, x)| panel[lane] = *x);
             }
-            self.workspace.solve_wide(cholesky, self.factors.of(own), panel.as_flattened_mut());
+            let count = columns.len() / n;
+            self.workspace.solve_wide(cholesky, self.factors.of(own), panel.as_flattened_mut(), count);
             for (lane, column) in columns.chunks_exact_mut(n).enumerate() {
                 column.iter_mut().zip(&panel).for_each(|(x, panel)| *x = panel[lane]);
             }
@@ -232,7 +228,7 @@ impl Factors {
                         panel.iter_mut().zip(&x[own]).for_each(|(panel, x)| panel[lane] = *x);
                     }
                     let cholesky = &self.symbolic[first].cholesky;
-                    self.workspace.solve_wide(cholesky, self.factors.of(first), panel.as_flattened_mut());
+                    self.workspace.solve_wide(cholesky, self.factors.of(first), panel.as_flattened_mut(), twins.len());
                     for (lane, &own) in twins.iter().enumerate() {
                         x[own].iter_mut().zip(&panel).for_each(|(x, panel)| *x = panel[lane]);
                     }

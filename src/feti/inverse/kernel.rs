@@ -5,9 +5,13 @@
 //! set of tetrahedra has exactly these modes.
 
 use crate::vector::{cross, difference, dot};
+use crate::work;
 
 /// Rigid modes of a subdomain, or of a cluster.
 pub const MODES: usize = 6;
+
+/// Operations at a point: 30 for the modes there, and 2 for each of their 18 numbers.
+const OF_POINT: usize = 66;
 
 /// Orthonormal rigid modes: columns 0..3 translations, 3..6 rotations.
 #[derive(Clone, Debug)]
@@ -75,6 +79,7 @@ impl RigidModes {
 
     /// `R'v` over the given nodes; `v` has three entries a node.
     pub fn resultants(&self, points: &[[f64; 3]], v: &[f64]) -> [f64; 6] {
+        work::each(points.len(), OF_POINT, 2 * size_of::<[f64; 3]>());
         let mut sum = [0.0; 6];
         for (point, force) in points.iter().zip(v.chunks_exact(3)) {
             for (row, f) in self.at(*point).iter().zip(force) {
@@ -86,6 +91,7 @@ impl RigidModes {
 
     /// `v += R amplitudes` over the given nodes.
     pub fn add_motion(&self, points: &[[f64; 3]], amplitudes: &[f64], v: &mut [f64]) {
+        work::each(points.len(), OF_POINT, 2 * size_of::<[f64; 3]>());
         for (point, u) in points.iter().zip(v.chunks_exact_mut(3)) {
             for (row, u) in self.at(*point).iter().zip(u) {
                 *u += row.iter().zip(amplitudes).map(|(r, a)| r * a).sum::<f64>();

@@ -164,9 +164,4 @@ impl Inverse {
     pub fn bases(&self) -> &[Bases] {
         &self.tangents.bases
     }
-
-    /// Bytes of factors that one [`Inverse::solve`] reads.
-    pub fn bytes_per_solve(&self) -> f64 {
-        self.factors.bytes_per_solve()
-    }
 }

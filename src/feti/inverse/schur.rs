@@ -11,6 +11,7 @@ use super::stock::{Batch, Stock};
 use crate::feti::Torn;
 use crate::sparse::cholesky::{Factor, Numbers, Precision, WIDTH, Workspace};
 use crate::sparse::submatrix::{Entries, Submatrix};
+use crate::work;
 
 /// Which unknowns are on the boundary, where their entries stand, and the analysis of the interior block.
 struct Split {
@@ -165,22 +166,6 @@ impl Schur {
         self.values.of(own).weak
     }
 
-    /// Additions and multiplications of factorising the interior of an own subdomain.
-    pub fn flops(&self, own: usize) -> f64 {
-        self.splits[own].interior.as_ref().map_or(0.0, |interior| interior.cholesky.flops())
-    }
-
-    /// Bytes of matrices that one [`Schur::apply`] reads: the factor twice, so the coupling, the boundary block once; blocks with
-    /// their indices.
-    pub fn bytes_per_apply(&self) -> f64 {
-        self.values.sum(|values| {
-            let Values { boundary_block, coupling, interior, .. } = values;
-            let with_indices = |block: &Numbers| block.bytes() + size_of::<u32>() * block.len();
-            let factor = interior.as_ref().map_or(0, Factor::bytes);
-            (2 * factor + with_indices(boundary_block) + 2 * with_indices(coupling)) as f64
-        })
-    }
-
     /// Whether two own subdomains have the same boundary, so that one may [`Schur::share`] the other's values.
     pub fn alike(&self, own: usize, other: usize) -> bool {
         Rc::ptr_eq(&self.splits[own], &self.splits[other])
@@ -260,8 +245,13 @@ impl<'a, const W: usize> Job<'a, W> {
         let (Some(interior), Some(factor)) = (&self.split.interior, &self.values.interior) else { return Vec::new() };
         let mut inside = vec![[0.0; W]; interior.unknowns.len()];
         self.split.coupling.subtract_transpose(&self.values.coupling, t, &mut inside);
-        let solve = if W == WIDTH { Workspace::solve_wide } else { Workspace::solve };
-        solve(workspace, &interior.cholesky, factor, inside.as_flattened_mut());
+        self.book(&self.values.coupling, 2);
+        let (cholesky, x) = (&interior.cholesky, inside.as_flattened_mut());
+        if W == WIDTH {
+            workspace.solve_wide(cholesky, factor, x, self.members.len());
+        } else {
+            workspace.solve(cholesky, factor, x);
+        }
         inside
     }
 
@@ -270,10 +260,17 @@ impl<'a, const W: usize> Job<'a, W> {
         let Values { boundary_block, coupling, .. } = self.values;
         let mut forces = vec![[0.0; W]; t.len()];
         self.split.boundary_block.add_symmetric(boundary_block, t, &mut forces);
+        self.book(boundary_block, 4);
         if !inside.is_empty() {
             self.split.coupling.add_product(coupling, inside, &mut forces);
+            self.book(coupling, 2);
         }
         forces
+    }
+
+    /// Books a product with a block, of so many operations an entry and member.
+    fn book(&self, block: &Numbers, flops: usize) {
+        work::add(flops * block.len() * self.members.len(), block.bytes() + size_of::<u32>() * block.len());
     }
 }
 

@@ -63,15 +63,6 @@ impl<T> Stock<T> {
         self.batches.get_or_init(|| self.sort())
     }
 
-    /// Sum over all batches of a number of their items.
-    pub fn sum(&self, of: impl Fn(&T) -> f64) -> f64 {
-        let first = |batch: &Batch| match batch {
-            Batch::Alone(own) => *own,
-            Batch::Twins(twins) => twins[0],
-        };
-        self.batches().iter().map(first).map(|own| of(self.of(own))).sum()
-    }
-
     fn sort(&self) -> Vec<Batch> {
         let mut batches = Vec::new();
         let mut open: HashMap<*const T, usize> = HashMap::new();

@@ -173,7 +173,6 @@ impl Tangents {
         let values = Rc::new(self.assembled.clone());
         self.values[own] = Rc::clone(&values);
         let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, &[], common));
-        on.timer.count("factorisation", on.factors.symbolic(own).analysis().flops(), 0.0);
         outcome?;
         // Where a body has become soft but for its volume, the entries of the volume hide it; the pivots do not.
         let drift = self.bases[own].drift;
@@ -247,7 +246,6 @@ impl Tangents {
     ) -> Result<(), NotDefinite> {
         let Some(schur) = &mut on.schur else { return Ok(()) };
         (self.bases[own].interior, self.bases[own].drift) = (Some(basis), 0.0);
-        on.timer.count("factorisation of the interior", schur.flops(own), 0.0);
         on.timer.time("factorisation of the interior", || schur.update(own, id, values, common))
     }
 }

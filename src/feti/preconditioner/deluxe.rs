@@ -23,6 +23,7 @@ use crate::feti::inverse::factor::Symbolic;
 use crate::feti::inverse::schur::Schur;
 use crate::sparse::cholesky::{Precision, Workspace};
 use crate::sparse::submatrix::Submatrix;
+use crate::work;
 
 /// The faces of one rank's subdomains.
 pub struct Deluxe<'a> {
@@ -151,6 +152,8 @@ impl<'a> Deluxe<'a> {
                 side.stiffness.get_or_insert_with(|| from_lower(n, numbers));
             }
             let [a, b] = face.sides.each_ref().map(|side| side.stiffness.as_ref().expect("it has come"));
+            // A factor, and two solves with as many right-hand sides.
+            work::add(7 * a.nrows().pow(3) / 3, 2 * size_of::<f64>() * a.nrows().pow(2));
             face.share = (a + b).llt(Side::Lower).ok().map(|factor| factor.solve(b));
         }
     }
@@ -164,6 +167,7 @@ impl<'a> Deluxe<'a> {
     pub fn share(&self, x: &[f64], displacements: &mut [Vec<f64>]) {
         for (face, share) in self.scaled() {
             let jumps: Vec<f64> = face.rows.iter().zip(&face.values).map(|(&row, v)| x[row as usize] / v).collect();
+            work::each(jumps.len() * jumps.len(), 2, size_of::<f64>());
             let first = share * ColRef::from_slice(&jumps);
             for (number, side) in face.own_sides() {
                 for (k, &place) in side.places.iter().enumerate() {
@@ -181,6 +185,7 @@ impl<'a> Deluxe<'a> {
             for (number, side) in face.own_sides() {
                 let taken = |&place: &u32| std::mem::take(&mut forces[side.own][place as usize]);
                 let taken: Vec<f64> = side.places.iter().map(taken).collect();
+                work::each(taken.len() * taken.len(), 2, size_of::<f64>());
                 let first = share.transpose() * ColRef::from_slice(&taken);
                 for (k, (&dof, v)) in side.dofs.iter().zip(&face.values).enumerate() {
                     let part = if number == 0 { first[k] } else { taken[k] - first[k] };

@@ -11,6 +11,7 @@ use crate::constraint::{Constraints, Term};
 use crate::feti::dual::gather::Gather;
 use crate::feti::dual::gram::SlotUnknown;
 use crate::sparse::pattern::Pattern;
+use crate::work;
 
 /// A group that gives way so many times as easily as its nodes alone is not held by the others: its nodes count alone.
 const LOOSE: f64 = 1e10;
@@ -135,6 +136,8 @@ impl Flexibility {
     /// `x = D^-1 x` on the unknowns of an own subdomain that rows touch: its `boundary`, ascending.
     pub fn apply(&self, own: usize, boundary: &[u32], x: &mut [f64]) {
         let forces: Vec<Vec<f64>> = self.tied[own].iter().map(|group| group.collect(x)).collect();
+        work::each(boundary.len(), 1, size_of::<f64>());
+        self.tied[own].iter().for_each(|group| work::each(group.values.len(), 2, size_of::<f64>()));
         x.iter_mut().zip(boundary).for_each(|(x, &dof)| *x *= self.alone[own][dof as usize]);
         for (Touched { places, values }, forces) in self.tied[own].iter().zip(forces) {
             for (&place, line) in places.iter().zip(values.chunks_exact(places.len())) {

@@ -14,9 +14,10 @@ use super::dual::space::RowSpace;
 use super::inverse::factor::NotDefinite;
 use super::inverse::schur::Schur;
 use crate::comm::{Comm, Shares};
-use crate::constraint::Constraints;
+use crate::constraint::{Constraints, Entry};
 use crate::decomposition::Subdomain;
 use crate::monitor::timing::Timer;
+use crate::work;
 
 /// Approximate inverse of `F`.
 pub struct Preconditioner<'a> {
@@ -151,17 +152,13 @@ impl<'a> Preconditioner<'a> {
         self.scaling.solve(x, &mut self.rows);
         for (own, t) in self.displacements.iter_mut().enumerate() {
             t.fill(0.0);
+            work::each(self.places[own].len(), 2, size_of::<Entry>());
             for (entry, &place) in self.gather.entries(own).iter().zip(&self.places[own]) {
                 t[place as usize] += entry.value * self.rows[entry.row as usize];
             }
             self.scaling.flexibility().apply(own, self.schur.boundary(own), t);
         }
         self.deluxe.share(x, &mut self.displacements);
-    }
-
-    /// Bytes of matrices that one application reads.
-    pub fn bytes_per_apply(&self) -> f64 {
-        self.schur.bytes_per_apply()
     }
 }
 

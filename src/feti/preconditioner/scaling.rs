@@ -11,6 +11,7 @@ use crate::constraint::Constraints;
 use crate::feti::dual::gather::Gather;
 use crate::feti::dual::gram::{Coefficient, Gram, coefficients};
 use crate::sparse::pattern::Pattern;
+use crate::work;
 
 /// Most rows of a small block.
 const SMALL: usize = 64;
@@ -80,6 +81,7 @@ impl Scaling {
     /// `y = (B D^-1 B')^-1 x`. Local.
     pub fn solve(&mut self, x: &[f64], y: &mut [f64]) {
         let mut at = 0;
+        work::each(self.inverses.len(), 2, size_of::<f64>());
         for rows in &self.blocks {
             let (x, n) = (&x[rows.clone()], rows.len());
             for (y, row) in y[rows.clone()].iter_mut().zip(self.inverses[at..at + n * n].chunks_exact(n)) {
@@ -120,6 +122,7 @@ fn block_matrix(
 /// Inverse of a symmetric matrix that is positive definite but for zero rows, which stay zero (Gauss-Jordan; definite
 /// blocks of a few rows need no pivoting).
 fn invert(mut a: Vec<f64>, n: usize) -> Vec<f64> {
+    work::add(2 * n * n * n, size_of_val(&a[..]));
     for k in 0..n {
         let pivot = a[n * k + k];
         if pivot == 0.0 {

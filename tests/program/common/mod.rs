@@ -71,10 +71,13 @@ pub const COARSEST: [&str; 3] =
 
 /// A summary without what belongs to the run, and may depend on the ranks or on the clock.
 pub fn only_result(summary: Value) -> Map<String, Value> {
-    const OF_THE_RUN: [&str; 10] = [
+    const OF_THE_RUN: [&str; 13] = [
         "ranks",
         "time",
         "work",
+        "counts",
+        "counts_total",
+        "partners",
         "communication",
         "time_total",
         "imbalance",

@@ -15,12 +15,14 @@ use faer::{Mat, Side};
 
 use super::gluing::Gluing;
 use super::halo::Halo;
+use super::motions::Transfer;
 use super::stiffness::{self, Inverse, TOGETHER};
 use super::{Motions, Tree};
 use crate::constraint::Constraints;
 use crate::decomposition::Decomposition;
 use crate::feti::dual::Interconnection;
 use crate::feti::inverse::kernel::MODES;
+use crate::work;
 
 /// Forces between the members of groups, and motions of these.
 pub struct Balance<'a> {
@@ -30,7 +32,7 @@ pub struct Balance<'a> {
     gluing: Gluing,
     levels: Vec<Level>,
     /// For each level, from 0, the inverses of the diagonal blocks of `G G'` of its groups that are at home here.
-    diagonals: Vec<Vec<[[f64; MODES]; MODES]>>,
+    diagonals: Vec<Vec<Transfer>>,
 }
 
 /// The groups of a level that are at home here.
@@ -118,6 +120,7 @@ impl<'a> Balance<'a> {
         let mut sums = vec![0.0; MODES * self.tree.own()];
         above.clone().for_each(|level| self.gluing.add_resultants(level, rows, &mut sums));
         let mut motions = self.sums(level, &sums);
+        book(&self.diagonals[level]);
         for (six, inverse) in motions.as_chunks_mut::<MODES>().0.iter_mut().zip(&self.diagonals[level]) {
             *six = inverse.map(|line| line.iter().zip(&*six).map(|(a, x)| a * x).sum());
         }
@@ -149,6 +152,7 @@ impl<'a> Balance<'a> {
     /// `sum of T_c' r_c` over the children of each group.
     fn restricted(&self, level: usize, of_children: &[f64]) -> Vec<f64> {
         let (children, transfers) = (of_children.as_chunks::<MODES>().0, &self.motions.transfers[level - 1]);
+        book(transfers);
         let mut sums = Vec::new();
         for members in self.tree.members(level) {
             let mut sum = [0.0; MODES];
@@ -164,6 +168,7 @@ impl<'a> Balance<'a> {
 
     /// `T_c a` for the children of each group.
     fn prolonged(&self, level: usize, of_groups: &[f64]) -> Vec<f64> {
+        book(&self.motions.transfers[level - 1]);
         let mut motions = Vec::new();
         for (a, members) in of_groups.as_chunks::<MODES>().0.iter().zip(self.tree.members(level)) {
             for transfer in &self.motions.transfers[level - 1][members.clone()] {
@@ -195,7 +200,7 @@ impl Level {
                 let of_group = values[members[group].clone()][1..].as_flattened();
                 x.iter_mut().zip(of_group).for_each(|(x, value)| x[lane] = *value);
             }
-            let y = inverse.multiply(&x);
+            let y = inverse.multiply(&x, groups.len());
             for (lane, &group) in groups.iter().enumerate() {
                 let (first, others) = values[members[group].clone()].split_at_mut(1);
                 first[0] = [0.0; MODES];
@@ -203,6 +208,11 @@ impl Level {
             }
         }
     }
+}
+
+/// Books products of vectors with these matrices.
+fn book(matrices: &[Transfer]) {
+    work::each(matrices.len(), 2 * MODES * MODES, size_of::<Transfer>());
 }
 
 /// The pseudo-inverse of a block: equalities need not hold a subdomain.

@@ -8,6 +8,7 @@ use crate::constraint::{Constraints, Kind};
 use crate::decomposition::{Clusters, Subdomain};
 use crate::feti::dual::gather::Gather;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
+use crate::work;
 
 /// `G` of one rank's equalities.
 pub struct Gluing {
@@ -55,6 +56,7 @@ impl Gluing {
     /// `sums += G rows` for own subdomains, by the rows of one level.
     pub fn add_resultants(&self, level: usize, rows: &[f64], sums: &mut [f64]) {
         let of = &self.levels[level - 1];
+        of.book();
         let sums = sums.as_chunks_mut::<MODES>().0;
         for (&row, slots) in of.rows.iter().zip(of.begin.windows(2)) {
             let x = rows[row as usize];
@@ -69,6 +71,7 @@ impl Gluing {
     /// `rows += factor G'a` in the rows of one level, of six numbers an own subdomain and one of the halo.
     pub fn add_moved(&self, level: usize, factor: f64, a: &[f64], rows: &mut [f64]) {
         let of = &self.levels[level - 1];
+        of.book();
         let a = a.as_chunks::<MODES>().0;
         for (&row, slots) in of.rows.iter().zip(of.begin.windows(2)) {
             let dot = |slot: usize| -> f64 {
@@ -76,6 +79,13 @@ impl Gluing {
             };
             rows[row as usize] += factor * (slots[0] as usize..slots[1] as usize).map(dot).sum::<f64>();
         }
+    }
+}
+
+impl Rows {
+    /// Books a product with `G` or `G'`.
+    fn book(&self) {
+        work::each(self.modes.len(), 2 * MODES, size_of::<[f64; MODES]>() + size_of::<u32>());
     }
 }
 

@@ -15,6 +15,7 @@ use crate::decomposition::{Clusters, Subdomain};
 use crate::feti::dual::gather::Gather;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
 use crate::simd::vectorised;
+use crate::work;
 
 /// `G` of a row, by members.
 type OfRow = Vec<(u32, [f64; MODES])>;
@@ -80,6 +81,7 @@ fn blocks(
         rows.sort_by_key(|row| row.0);
         let mut blocks = Blocks::new();
         for (_, of_row) in &rows {
+            work::add(MODES * MODES * of_row.len() * (of_row.len() + 1), size_of_val(&of_row[..]));
             for (at, (column, b)) in of_row.iter().enumerate() {
                 for (row, a) in &of_row[at..] {
                     let block = blocks.entry((*row, *column)).or_insert([0.0; MODES * MODES]);
@@ -180,6 +182,8 @@ impl Inverse {
                 matrix[(row + k / MODES, column + k % MODES)] = *x;
             }
         }
+        // A factor of n^3/3 and an inverse of 2n^3/3 operations.
+        work::add(length.pow(3), size_of::<f64>() * length * length);
         let largest = (0..length).map(|k| matrix[(k, k)]).fold(0.0, f64::max);
         let factor = matrix.llt(Side::Lower).ok()?;
         let inverse = factor.inverse();
@@ -189,8 +193,9 @@ impl Inverse {
         is_firm.then_some(Self { length, columns })
     }
 
-    /// Its product with up to [`TOGETHER`] vectors; the bits of each do not depend on the others.
-    pub fn multiply(&self, x: &[[f64; TOGETHER]]) -> Vec<[f64; TOGETHER]> {
+    /// Its product with `count` vectors, up to [`TOGETHER`]; the bits of each do not depend on the others.
+    pub fn multiply(&self, x: &[[f64; TOGETHER]], count: usize) -> Vec<[f64; TOGETHER]> {
+        work::add(2 * count * self.columns.len(), size_of_val(&self.columns[..]));
         let mut y = vec![[0.0; TOGETHER]; self.length];
         vectorised(
             (&self.columns[..], x, &mut y[..]),
