@@ -26,7 +26,7 @@ pub use self::resume::{Resume, resume};
 pub use self::solve::{Cascade, Solve, solve};
 pub use self::verify::{Verify, verify};
 use crate::comm::agree::root_texts;
-use crate::comm::{Comm, Shares, decide, maximum, ordered_sum};
+use crate::comm::{Comm, decide, exact, maximum};
 use crate::heap::EXIT_MEMORY;
 use crate::model::ModelError;
 use crate::model::meshes::MeshError;
@@ -242,6 +242,6 @@ fn describe_run(summary: &mut Summary, source: &Source, comm: &dyn Comm) {
     summary.level = source.level;
     summary.ranks = comm.size();
     let mine = peak_rss_mb().unwrap_or(f64::NAN);
-    summary.peak_rss_mb = Some(ordered_sum(comm, &Shares::new(vec![1; comm.size()]), &[mine], 1)[0]);
+    summary.peak_rss_mb = Some(exact::sum(comm, &[mine], 1)[0]);
     summary.peak_rss_mb_max = Some(maximum(comm, &[mine])[0]);
 }

@@ -4,9 +4,8 @@
 //! launcher), [`threads`] (n ranks as threads of one process, for tests) and [`world::World`] (MPI).
 //! [`Metered`](crate::monitor::metered::Metered) counts what goes through any of them.
 //!
-//! Results must be *bitwise* the same for every number of ranks. So no sum is ever left to the communication layer:
-//! ranks hand over one partial value per subdomain, and [`ordered_sum`] adds them in subdomain order on rank 0.
-//! It does not know subdomains beyond that: ranks own consecutive blocks of them, so rank order is subdomain order.
+//! Results must be *bitwise* the same for every number of ranks. So the communication layer adds integers only: partial sums of
+//! subdomains are added up as long integers ([`exact`]), in messages whose length depends neither on the scene nor on the ranks.
 
 pub mod agree;
 pub mod common;
@@ -18,8 +17,6 @@ pub mod threads;
 pub mod watched;
 pub mod words;
 pub mod world;
-
-use crate::work;
 
 /// Collective and neighbour communication of one rank. All methods but [`Comm::rank`] and [`Comm::size`] are
 /// collective: every rank calls them in the same order.
@@ -37,8 +34,8 @@ pub trait Comm {
     /// Every rank's `mine` concatenated in rank order, on every rank; `counts[r]` is the length that rank `r` hands in.
     fn all_gather(&self, mine: &[f64], counts: &[usize]) -> Vec<f64>;
 
-    /// As [`Comm::all_gather`], but on rank 0 only; empty elsewhere.
-    fn gather(&self, mine: &[f64], counts: &[usize]) -> Vec<f64>;
+    /// Puts integers of all ranks together, entry by entry; equal lengths.
+    fn reduce(&self, how: Reduction, numbers: &mut [i64]);
 
     /// Overwrites `data` on every rank by rank 0's; equal lengths.
     fn broadcast(&self, data: &mut [f64]);
@@ -48,6 +45,15 @@ pub trait Comm {
 
     /// The MPI communicator behind this one, for parallel HDF5; `None` where ranks are not MPI processes.
     fn raw_mpi(&self) -> Option<RawMpi>;
+}
+
+/// How integers of several ranks are put together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reduction {
+    /// They are added up, modulo 2^64.
+    Sum,
+    /// The largest is taken.
+    Largest,
 }
 
 /// MPI's own handle of a communicator.
@@ -90,35 +96,26 @@ impl Shares {
     }
 }
 
-/// Sums columns over all items: `mine` holds `width` partial values per item that this rank owns, item by item.
-/// Rank 0 adds in item order and everybody gets its result: ranks cannot disagree, and the bits do not depend on how
-/// the items are spread over the ranks.
-pub fn ordered_sum(comm: &dyn Comm, shares: &Shares, mine: &[f64], width: usize) -> Vec<f64> {
-    let rows = comm.gather(mine, &shares.counts(width));
-    work::each(rows.len(), 1, size_of::<f64>());
-    let mut sum = vec![0.0; width];
-    // Nothing is summed where the width is zero.
-    for row in rows.chunks_exact(width.max(1)) {
-        for (s, value) in sum.iter_mut().zip(row) {
-            *s += value;
-        }
-    }
-    comm.broadcast(&mut sum);
-    sum
-}
-
 /// The largest of all ranks' values, by column; NaN wins, so that a fault on one rank is seen by all.
 pub fn maximum(comm: &dyn Comm, mine: &[f64]) -> Vec<f64> {
-    let all = comm.all_gather(mine, &vec![mine.len(); comm.size()]);
-    let mut result = mine.to_vec();
-    for row in all.chunks_exact(mine.len()) {
-        for (r, &value) in result.iter_mut().zip(row) {
-            if value.is_nan() || value > *r {
-                *r = value;
-            }
-        }
-    }
-    result
+    // Bits of doubles ascend as integers, once those of negative ones are turned round; beyond infinity is NaN.
+    let turned = |bits: i64| if bits < 0 { bits ^ i64::MAX } else { bits };
+    let bits = |x: &f64| if x.is_nan() { f64::NAN.abs() } else { *x }.to_bits().cast_signed();
+    let mut all: Vec<i64> = mine.iter().map(|x| turned(bits(x))).collect();
+    comm.reduce(Reduction::Largest, &mut all);
+    all.into_iter().map(|bits| f64::from_bits(turned(bits).cast_unsigned())).collect()
+}
+
+/// Some numbers of the rank whose `value` is largest, of the lowest one among equals; NaN is no value. Collective.
+pub fn of_largest<const N: usize>(comm: &dyn Comm, value: f64, numbers: [f64; N]) -> [f64; N] {
+    let value = if value.is_nan() { f64::NEG_INFINITY } else { value };
+    let is_largest = maximum(comm, &[value])[0] == value;
+    let rank = comm.rank() as i64;
+    let mut first = [if is_largest { -rank } else { i64::MIN }];
+    comm.reduce(Reduction::Largest, &mut first);
+    let mut bits = numbers.map(|x| if first[0] == -rank { x.to_bits().cast_signed() } else { 0 });
+    comm.reduce(Reduction::Sum, &mut bits);
+    bits.map(|bits| f64::from_bits(bits.cast_unsigned()))
 }
 
 /// What rank 0 decides, on every rank.
@@ -130,26 +127,41 @@ pub fn decide(comm: &dyn Comm, choice: bool) -> bool {
 
 /// Rank 0's integers, on every rank.
 pub fn from_root(comm: &dyn Comm, mine: Vec<u64>) -> Vec<u64> {
-    let outgoing = if comm.rank() == 0 { vec![mine; comm.size()] } else { vec![Vec::new(); comm.size()] };
-    comm.all_to_all(outgoing).swap_remove(0)
+    let mut length = [mine.len() as f64];
+    comm.broadcast(&mut length);
+    let mut data: Vec<f64> = mine.into_iter().map(f64::from_bits).collect();
+    data.resize(length[0] as usize, 0.0);
+    comm.broadcast(&mut data);
+    data.into_iter().map(f64::to_bits).collect()
 }
 
 /// Integers of all ranks in rank order; lengths may differ.
 pub fn all_gather_u64(comm: &dyn Comm, mine: &[u64]) -> Vec<u64> {
-    comm.all_to_all(vec![mine.to_vec(); comm.size()]).concat()
+    of_ranks(comm, mine).1
+}
+
+/// Lengths and integers of all ranks. Messages are bits: doubles are not looked at on their way.
+fn of_ranks(comm: &dyn Comm, mine: &[u64]) -> (Vec<usize>, Vec<u64>) {
+    let lengths = comm.all_gather(&[mine.len() as f64], &vec![1; comm.size()]);
+    let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
+    let mine: Vec<f64> = mine.iter().map(|bits| f64::from_bits(*bits)).collect();
+    let all = comm.all_gather(&mine, &lengths).into_iter().map(f64::to_bits).collect();
+    (lengths, all)
 }
 
 /// Sums of counts over all ranks.
 pub fn sums<const N: usize>(comm: &dyn Comm, mine: [u64; N]) -> [u64; N] {
-    let all = all_gather_u64(comm, &mine);
-    std::array::from_fn(|k| all.iter().skip(k).step_by(N).sum())
+    let mut sums = mine.map(u64::cast_signed);
+    comm.reduce(Reduction::Sum, &mut sums);
+    sums.map(i64::cast_unsigned)
 }
 
 /// Texts of all ranks in rank order.
 pub fn all_gather_text(comm: &dyn Comm, mine: &str) -> Vec<String> {
     let packed: Vec<u64> = mine.bytes().map(u64::from).collect();
-    comm.all_to_all(vec![packed; comm.size()])
-        .into_iter()
-        .map(|bytes| String::from_utf8_lossy(&bytes.into_iter().map(|b| b as u8).collect::<Vec<_>>()).into_owned())
-        .collect()
+    let (lengths, all) = of_ranks(comm, &packed);
+    let mut all = &all[..];
+    let text =
+        |length: usize| -> Vec<u8> { all.split_off(..length).into_iter().flatten().map(|byte| *byte as u8).collect() };
+    lengths.into_iter().map(text).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).collect()
 }

@@ -1,6 +1,6 @@
 //! One rank, no launcher.
 
-use super::{Comm, RawMpi};
+use super::{Comm, RawMpi, Reduction};
 
 /// The communicator of a run with a single rank.
 pub struct Solo;
@@ -22,9 +22,7 @@ impl Comm for Solo {
         mine.to_vec()
     }
 
-    fn gather(&self, mine: &[f64], _: &[usize]) -> Vec<f64> {
-        mine.to_vec()
-    }
+    fn reduce(&self, _: Reduction, _: &mut [i64]) {}
 
     fn broadcast(&self, _: &mut [f64]) {}
 

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex};
 
-use super::{Comm, RawMpi};
+use super::{Comm, RawMpi, Reduction};
 
 /// One rank's end of a group of threads.
 pub struct Thread {
@@ -122,12 +122,18 @@ impl Comm for Thread {
         (0..self.size).flat_map(|from| self.receive::<Vec<f64>>(from)).collect()
     }
 
-    fn gather(&self, mine: &[f64], _: &[usize]) -> Vec<f64> {
-        self.send(0, mine.to_vec());
-        if self.rank > 0 {
-            return Vec::new();
+    fn reduce(&self, how: Reduction, numbers: &mut [i64]) {
+        (0..self.size).for_each(|to| self.send(to, numbers.to_vec()));
+        let mut all = (0..self.size).map(|from| self.receive::<Vec<i64>>(from));
+        numbers.copy_from_slice(&all.next().unwrap_or_default());
+        for theirs in all {
+            for (mine, other) in numbers.iter_mut().zip(theirs) {
+                *mine = match how {
+                    Reduction::Sum => mine.wrapping_add(other),
+                    Reduction::Largest => (*mine).max(other),
+                };
+            }
         }
-        (0..self.size).flat_map(|from| self.receive::<Vec<f64>>(from)).collect()
     }
 
     fn broadcast(&self, data: &mut [f64]) {
@@ -155,7 +161,7 @@ impl Comm for Thread {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::{Shares, all_gather_text, decide, maximum, ordered_sum};
+    use crate::comm::{all_gather_text, decide, from_root, maximum, of_largest, sums};
 
     #[test]
     fn collectives_deliver_in_rank_order() {
@@ -166,17 +172,26 @@ mod tests {
                 let gathered = comm.all_gather(&vec![rank; comm.rank()], &(0..size).collect::<Vec<_>>());
                 let expected: Vec<f64> = (0..size).flat_map(|r| vec![r as f64; r]).collect();
                 assert_eq!(gathered, expected);
-                assert_eq!(maximum(comm, &[rank, -rank]), [size as f64 - 1.0, 0.0]);
+                assert_eq!(maximum(comm, &[rank, -rank, rank - 9.0]), [size as f64 - 1.0, -0.0, size as f64 - 10.0]);
+                let fault = maximum(comm, &[if comm.rank() == 0 { -f64::NAN } else { f64::INFINITY }]);
+                assert!(fault[0].is_nan());
+                assert_eq!(maximum(comm, &[f64::NEG_INFINITY]), [f64::NEG_INFINITY]);
+                assert_eq!(
+                    of_largest(comm, (rank - 1.0).abs(), [rank, f64::NAN])[0],
+                    if size > 3 { size as f64 - 1.0 } else { 0.0 }
+                );
+                assert_eq!(of_largest(comm, f64::NAN, [rank]), [0.0]);
+                assert_eq!(from_root(comm, vec![u64::MAX, 7].repeat(1 + comm.rank())), [u64::MAX, 7]);
                 assert!(decide(comm, comm.rank() == 0));
                 let swapped = comm.all_to_all((0..size).map(|to| vec![comm.rank() as u64, to as u64]).collect());
                 for (from, pair) in swapped.iter().enumerate() {
                     assert_eq!(*pair, [from as u64, comm.rank() as u64]);
                 }
-                assert_eq!(all_gather_text(comm, &format!("r{}", comm.rank())).len(), size);
-                ordered_sum(comm, &Shares::new(vec![1; size]), &[rank, 1.0], 2)
+                let texts = all_gather_text(comm, &"é".repeat(comm.rank()));
+                assert!(texts.into_iter().eq((0..size).map(|rank| "é".repeat(rank))));
+                sums(comm, [comm.rank() as u64, 1])
             });
-            let total = (size * (size - 1) / 2) as f64;
-            assert!(results.iter().all(|r| *r == [total, size as f64]));
+            assert!(results.iter().all(|r| *r == [size as u64 * (size as u64 - 1) / 2, size as u64]));
         }
     }
 

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::{Comm, all_gather_u64};
+use super::{Comm, Reduction, all_gather_u64};
 
 /// This rank's share in some items: consecutive ones, as many as others have, give or take one.
 pub fn share(items: u64, comm: &dyn Comm) -> Range<u64> {
@@ -23,14 +23,10 @@ pub fn holder(item: u64, items: u64, comm: &dyn Comm) -> usize {
 }
 
 /// Sums over all ranks, entry by entry. Collective.
-pub fn sum(comm: &dyn Comm, mut mine: Vec<u64>) -> Vec<u64> {
-    if comm.size() > 1 {
-        let all = all_gather_u64(comm, &mine);
-        let length = mine.len().max(1);
-        mine.fill(0);
-        all.chunks_exact(length).for_each(|theirs| mine.iter_mut().zip(theirs).for_each(|(sum, x)| *sum += x));
-    }
-    mine
+pub fn sum(comm: &dyn Comm, mine: Vec<u64>) -> Vec<u64> {
+    let mut sums: Vec<i64> = mine.into_iter().map(u64::cast_signed).collect();
+    comm.reduce(Reduction::Sum, &mut sums);
+    sums.into_iter().map(i64::cast_unsigned).collect()
 }
 
 /// Sum of the ranks before this one, and of all. Collective.

@@ -2,14 +2,14 @@
 
 use std::io::Write;
 
-use mpi::collective::{CommunicatorCollectives, Root};
+use mpi::collective::{CommunicatorCollectives, Root, SystemOperation};
 use mpi::datatype::{Partition, PartitionMut};
 use mpi::environment::Universe;
 use mpi::point_to_point::{Destination, Source};
 use mpi::raw::AsRaw;
 use mpi::topology::{Communicator, SimpleCommunicator};
 
-use super::{Comm, RawMpi};
+use super::{Comm, RawMpi, Reduction};
 
 /// All processes that the MPI launcher started. MPI is finalised when this is dropped.
 pub struct World {
@@ -120,16 +120,13 @@ impl Comm for World {
         all
     }
 
-    fn gather(&self, mine: &[f64], counts: &[usize]) -> Vec<f64> {
-        let root = self.world.process_at_rank(0);
-        if self.rank() > 0 {
-            root.gather_varcount_into(mine);
-            return Vec::new();
-        }
-        let Blocks { lengths, begins, total } = Blocks::new("numbers of all ranks, on the first", counts);
-        let mut all = vec![0.0; total];
-        root.gather_varcount_into_root(mine, &mut PartitionMut::new(&mut all[..], &lengths[..], &begins[..]));
-        all
+    fn reduce(&self, how: Reduction, numbers: &mut [i64]) {
+        let mine = numbers.to_vec();
+        let operation = match how {
+            Reduction::Sum => SystemOperation::sum(),
+            Reduction::Largest => SystemOperation::max(),
+        };
+        self.world.all_reduce_into(&mine[..], numbers, operation);
     }
 
     fn broadcast(&self, data: &mut [f64]) {

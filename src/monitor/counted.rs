@@ -1,7 +1,7 @@
 //! What ranks did and said in each phase, free of noise: the busiest rank and the mean.
 
 use super::timing::{Mail, Spent};
-use crate::comm::{Comm, Shares, maximum, ordered_sum};
+use crate::comm::{Comm, exact, maximum};
 use crate::record::counts::{Counted, Counts, Load};
 
 /// Numbers of a rank and phase.
@@ -18,7 +18,7 @@ pub(super) fn gather(comm: &dyn Comm, names: &[String], spent: &[Spent], partner
     let mut mine: Vec<f64> = spent.iter().chain([&total]).flat_map(numbers).collect();
     mine.push(partners as f64);
     let most = maximum(comm, &mine);
-    let sums = ordered_sum(comm, &Shares::new(vec![1; comm.size()]), &mine, mine.len());
+    let sums = exact::sum(comm, &mine, mine.len());
     let loads = most.iter().zip(sums).map(|(&busiest, sum)| Load { busiest, mean: sum / comm.size() as f64 });
     let loads: Vec<Load> = loads.collect();
     let mut counts = loads.as_chunks::<WIDTH>().0.iter().map(|loads| of(*loads));

@@ -4,7 +4,7 @@
 //! comes to it, not how the library passes it on.
 
 use super::timing::{Mail, Messages, Timer};
-use crate::comm::{Comm, RawMpi};
+use crate::comm::{Comm, RawMpi, Reduction};
 
 /// Bytes of a number, whatever it is.
 const NUMBER: u64 = 8;
@@ -62,13 +62,9 @@ impl Comm for Metered<'_> {
         all
     }
 
-    fn gather(&self, mine: &[f64], counts: &[usize]) -> Vec<f64> {
-        let all = self.meter(Messages::Collective, mine.len(), |comm| comm.gather(mine, counts));
-        match self.rank() {
-            0 => self.collective(0, all.len() - mine.len()),
-            _ => self.collective(mine.len(), 0),
-        }
-        all
+    fn reduce(&self, how: Reduction, numbers: &mut [i64]) {
+        self.meter(Messages::Collective, numbers.len(), |comm| comm.reduce(how, numbers));
+        self.collective(numbers.len(), numbers.len());
     }
 
     fn broadcast(&self, data: &mut [f64]) {
@@ -105,7 +101,7 @@ impl Comm for Metered<'_> {
 mod tests {
     use super::super::timing::{OUTSIDE, Traffic};
     use super::*;
-    use crate::comm::{Shares, ordered_sum, threads};
+    use crate::comm::threads;
 
     #[test]
     fn counts_calls_and_what_each_rank_hands_in() {
@@ -113,8 +109,9 @@ mod tests {
             let timer = Timer::start();
             let metered = Metered::new(comm, &timer);
             let rank = comm.rank();
-            let sum = ordered_sum(&metered, &Shares::new(vec![1; 3]), &[rank as f64, 1.0], 2);
-            assert_eq!(sum, [3.0, 3.0]);
+            let mut sum = [rank as i64, 1];
+            metered.reduce(Reduction::Sum, &mut sum);
+            assert_eq!(sum, [3, 3]);
             let mut incoming = vec![vec![0.0; 4]];
             if rank < 2 {
                 metered.exchange(&[1 - rank], &[vec![rank as f64; 4]], &mut incoming);
@@ -122,7 +119,7 @@ mod tests {
             }
             let [exchange, collectives, set_up] = Messages::ALL.map(|kind| timer.traffic(kind));
             assert_eq!((exchange.calls, exchange.bytes), if rank < 2 { (1, 32) } else { (0, 0) });
-            assert_eq!((collectives.calls, collectives.bytes), (2, if rank == 0 { 32 } else { 16 }));
+            assert_eq!((collectives.calls, collectives.bytes), (1, 16));
             assert!(collectives.seconds > 0.0);
             assert_eq!(set_up, Traffic::default());
             assert_eq!(timer.partners(), usize::from(rank < 2));
@@ -136,7 +133,7 @@ mod tests {
             let timer = Timer::start();
             let (metered, rank) = (Metered::new(comm, &timer), comm.rank());
             timer.time("all-gather", || metered.all_gather(&vec![0.0; rank + 1], &[1, 2, 3]));
-            timer.time("gather", || metered.gather(&[0.0; 5], &[5; 3]));
+            timer.time("reduction", || metered.reduce(Reduction::Largest, &mut [0; 5]));
             timer.time("broadcast", || metered.broadcast(&mut [0.0; 7]));
             // Rank 0 has ten numbers for rank 2, everybody four for itself.
             let mut outgoing = vec![Vec::new(); 3];
@@ -154,7 +151,7 @@ mod tests {
             let of_rank = |values: [[u64; 5]; 3]| values[rank];
             let all_gather = [[0, 1, 8, 40, 40], [0, 1, 16, 32, 32], [0, 1, 24, 24, 24]];
             assert_eq!(mail("all-gather"), of_rank(all_gather));
-            assert_eq!(mail("gather"), of_rank([[0, 1, 0, 80, 80], [0, 1, 40, 0, 40], [0, 1, 40, 0, 40]]));
+            assert_eq!(mail("reduction"), [0, 1, 40, 40, 40]);
             assert_eq!(mail("broadcast"), of_rank([[0, 1, 56, 0, 56], [0, 1, 0, 56, 56], [0, 1, 0, 56, 56]]));
             assert_eq!(mail(OUTSIDE), of_rank([[1, 1, 88, 8, 80], [0, 1, 8, 8, 8], [0, 1, 8, 88, 8]]));
         });

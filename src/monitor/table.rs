@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::counted;
 use super::timing::{Messages, OUTSIDE, Spent, Timer, peak_rss_mb};
-use crate::comm::{Comm, Shares, all_gather_text, maximum, ordered_sum};
+use crate::comm::{Comm, all_gather_text, exact, maximum};
 use crate::record::counts::{Counted, Work};
 
 /// The phases of all ranks.
@@ -91,7 +91,7 @@ impl PhaseTable {
         let mut spreads = largest[..count].chunks_exact(2).map(|pair| Spread { max: pair[0], min: -pair[1] });
         let (total_seconds, calls) = (largest[count], &largest[count + 1..]);
         let work: Vec<f64> = spent.iter().flat_map(|s| [s.work.flops, s.work.bytes]).collect();
-        let work = ordered_sum(comm, &Shares::new(vec![1; comm.size()]), &work, work.len());
+        let work = exact::sum(comm, &work, work.len());
         let phases = names.len();
         let names = names.into_iter().chain(messages.map(|(name, _)| name.to_owned()));
         let mut rows: Vec<Phase> = names

@@ -254,7 +254,7 @@ impl<'a> StepSolver<'a> {
             let TornProblem { subdomains, constraints, space, .. } = problem;
             preconditioner.update(operator, &changes, subdomains, constraints, space, timer)?;
         }
-        Ok(changes.fresh.into_iter().filter(|fresh| *fresh).count())
+        Ok(changes.refreshed as usize)
     }
 
     /// `du` from the forces `f_k` and the multipliers that were `found`, to which it adds what the program does not see; `open` is

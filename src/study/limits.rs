@@ -19,8 +19,8 @@ use std::collections::{BTreeSet, HashMap};
 
 use super::contact::ContactState;
 use crate::assembly::gradients;
-use crate::comm::Comm;
 use crate::comm::meeting::look_up;
+use crate::comm::{Comm, of_largest};
 use crate::constraint::Kind;
 use crate::constraint::law::Status;
 use crate::contact::Site;
@@ -84,24 +84,21 @@ pub(super) fn measure(
     };
     let owned = problem.space.owned();
     let of_nodes = displacements(comm, discrete, u, owned.iter().cloned().flatten().filter_map(closed));
-    let mut partial = Vec::new();
+    let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
     let subdomains = problem.subdomains.iter().zip(u).zip(owned);
     for ((subdomain, u), rows) in subdomains {
-        let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
         add_body(&mut worst, subdomain, u, diagonal(&discrete.extents[subdomain.body]));
         for row in rows.clone() {
             if let Some(pair) = closed(row) {
                 add_contact(&mut worst, scene, discrete, pair, at, &of_nodes);
             }
         }
-        let numbers = |w: &Worst| [w.value, w.of as f64, w.place[0], w.place[1], w.place[2]];
-        partial.extend(worst.iter().flat_map(numbers));
     }
-    let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
-    let all = problem.space.of_all(&partial, 5 * worst.len());
-    for (k, &[value, of, x, y, z]) in all.as_chunks::<5>().0.iter().enumerate() {
-        worst[k % (OF_BODIES + OF_CONTACTS)].add(value, of as usize, || [x, y, z]);
-    }
+    let worst = worst.map(|w| {
+        let [value, of, place @ ..] =
+            of_largest(comm, w.value, [w.value, w.of as f64, w.place[0], w.place[1], w.place[2]]);
+        Worst { value, of: of as usize, place }
+    });
     let found = |k: usize, name: &dyn Fn(usize) -> String| {
         let Worst { value, of, place } = worst[k];
         (value > 0.0 && value.is_finite()).then(|| Extreme { value, of: name(of), at: place })

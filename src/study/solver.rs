@@ -50,9 +50,8 @@ pub(super) fn step_solver<'a>(
         scene::Preconditioner::Lumped => Some(schur(None)),
         scene::Preconditioner::Dirichlet => Some(schur(Some(precision))),
     };
-    let shares = &decomposition.shares;
     let preconditioner =
-        schur.map(|schur| timer.time("interfaces", || Preconditioner::new(comm, shares, constraints, gather, schur)));
+        schur.map(|schur| timer.time("interfaces", || Preconditioner::new(connection, constraints, schur)));
     timer.time("coarse set-up", || model::held::at_all_stages(scene, discrete, &mut coarse, space, modes, stages))?;
     let hybrid = timer.time("clusters", || Hybrid::of_clusters(connection, decomposition, constraints))?;
     let pinnable = timer.time("symbolic analysis", || pinnable::unknowns(constraints, subdomains, modes));

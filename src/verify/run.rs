@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Case, End, Error, Row};
 use crate::assembly::Region;
 use crate::assembly::loads::Load;
-use crate::comm::{Comm, all_gather_u64, maximum, ordered_sum};
+use crate::comm::{Comm, all_gather_u64, exact, maximum};
 use crate::decomposition::Subdomain;
 use crate::element::Kind;
 use crate::element::sample::{Sample, samples};
@@ -94,11 +94,11 @@ impl<'a> Run<'a> {
         self.discrete.decomposition.subdomains.iter().zip(&self.solved.u)
     }
 
-    /// Sums over the elements of all subdomains, in their order. Collective.
+    /// Sums over the elements of all subdomains. Collective.
     fn sum<const N: usize>(&self, of: impl Fn(&Subdomain, &[[f64; 3]]) -> [f64; N]) -> [f64; N] {
         let partial = self.subdomains().flat_map(|(subdomain, u)| of(subdomain, u.as_chunks().0));
         let partial: Vec<f64> = partial.collect();
-        let sum = ordered_sum(self.comm, &self.discrete.decomposition.shares, &partial, N);
+        let sum = exact::sum(self.comm, &partial, N);
         std::array::from_fn(|k| sum[k])
     }
 
@@ -138,7 +138,7 @@ impl<'a> Run<'a> {
         let Estimate { errors, stresses } =
             estimate::error(&regions, &self.solved.u, |own, x| exact.stress(subdomains[own].body, x));
         let partial: Vec<f64> = errors.iter().zip(stresses).flat_map(|(e, s)| [e.iter().sum(), s]).collect();
-        let sum = ordered_sum(self.comm, &decomposition.shares, &partial, 2);
+        let sum = exact::sum(self.comm, &partial, 2);
         let estimated = self.summary().state.errors.discretisation.unwrap_or(f64::NAN);
         estimated / (sum[0] / sum[1]).sqrt()
     }
@@ -203,7 +203,7 @@ impl<'a> Run<'a> {
             });
             partial.extend(sums);
         }
-        let sums = ordered_sum(self.comm, &self.discrete.decomposition.shares, &partial, 2);
+        let sums = exact::sum(self.comm, &partial, 2);
         (sums[0] / sums[1]).sqrt()
     }
 

@@ -3,7 +3,7 @@
 //! All follow from the decomposition and the rows alone: no material, no load.
 
 use super::gather::Gather;
-use super::levels::{Motions, Tree};
+use super::levels::{Halo, Motions, Tree};
 use super::space::RowSpace;
 use crate::comm::Comm;
 use crate::constraint::Constraints;
@@ -16,6 +16,8 @@ pub struct Interconnection<'a> {
     pub gather: Gather<'a>,
     /// Inner products of multipliers.
     pub space: RowSpace<'a>,
+    /// Neighbouring subdomains of other ranks.
+    pub halo: Halo<'a>,
     /// Groups of subdomains.
     pub tree: Tree<'a>,
     /// Rigid modes of subdomains and their groups.
@@ -31,6 +33,7 @@ impl<'a> Interconnection<'a> {
         Self {
             gather: Gather::new(comm, shares, constraints, dofs),
             space: RowSpace::new(comm, shares, constraints),
+            halo: Halo::new(comm, shares, constraints),
             motions: Motions::new(&tree, subdomains),
             tree,
         }

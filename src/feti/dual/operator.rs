@@ -22,6 +22,10 @@ pub struct Changes {
     pub fresh: Vec<bool>,
     /// Whether the interior is weak ([`Schur::is_weak`]); never without a preconditioner.
     pub weak: Vec<bool>,
+    /// Subdomains with a new tangent, over all ranks.
+    pub refreshed: u64,
+    /// Whether any rank has a weak one.
+    pub is_any_weak: bool,
 }
 
 /// The dual operator; counts its applications.
@@ -54,11 +58,10 @@ impl<'a> DualOperator<'a> {
     ) -> Result<Changes, NotDefinite> {
         let fresh = agree(self.inverse.update(at, left, interiors.as_deref_mut(), timer), space)?;
         let is_weak = |own| interiors.as_ref().is_some_and(|schur| schur.is_weak(own));
-        let of_own = |(own, fresh): (usize, bool)| [fresh, is_weak(own)].map(|is| f64::from(u8::from(is)));
-        let mine: Vec<f64> = fresh.into_iter().enumerate().flat_map(of_own).collect();
-        let all = space.of_all(&mine, 2);
-        let (fresh, weak) = all.as_chunks().0.iter().map(|[fresh, weak]| (*fresh > 0.0, *weak > 0.0)).unzip();
-        Ok(Changes { fresh, weak })
+        let weak: Vec<bool> = (0..fresh.len()).map(is_weak).collect();
+        let count = |of: &[bool]| of.iter().filter(|is| **is).count() as u64;
+        let [refreshed, weak_everywhere] = space.counts([count(&fresh), count(&weak)]);
+        Ok(Changes { fresh, weak, refreshed, is_any_weak: weak_everywhere > 0 })
     }
 
     /// As [`Inverse::remake`]. Collective.

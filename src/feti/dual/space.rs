@@ -1,11 +1,11 @@
 //! Inner products of dual vectors and sums over subdomains, the same bits on any number of ranks.
 //!
 //! Each row counts for the lowest subdomain of its block; these rows are one behind the other. Products are summed per
-//! subdomain, every [`LANES`]th row in one sum, then over the subdomains in their order on rank 0.
+//! subdomain, every [`LANES`]th row in one sum, then over all subdomains, exactly ([`exact`]).
 
 use std::ops::Range;
 
-use crate::comm::{Comm, Shares, all_gather_u64, maximum, ordered_sum};
+use crate::comm::{Comm, Reduction, Shares, all_gather_u64, exact, maximum, sums};
 use crate::constraint::Constraints;
 use crate::feti::Torn;
 use crate::simd::vectorised;
@@ -20,7 +20,6 @@ const TOGETHER: usize = 4;
 /// Inner products over all rows of all ranks.
 pub struct RowSpace<'a> {
     comm: &'a dyn Comm,
-    shares: Shares,
     /// For each own subdomain, the rows that count for it.
     owned: Vec<Range<usize>>,
 }
@@ -38,7 +37,7 @@ impl<'a> RowSpace<'a> {
                 *owned = if goes_on { owned.start } else { rows.start }..rows.end;
             }
         }
-        Self { comm, shares: shares.clone(), owned }
+        Self { comm, owned }
     }
 
     /// For each own subdomain, the rows that count for it: every row counts exactly once over all ranks.
@@ -65,12 +64,7 @@ impl<'a> RowSpace<'a> {
 
     /// Sums of `width` values per own subdomain over all subdomains.
     pub fn sum(&self, partial: &[f64], width: usize) -> Vec<f64> {
-        ordered_sum(self.comm, &self.shares, partial, width)
-    }
-
-    /// The `width` values of each subdomain, of all of them, on every rank. Collective.
-    pub fn of_all(&self, mine: &[f64], width: usize) -> Vec<f64> {
-        self.comm.all_gather(mine, &self.shares.counts(width))
+        exact::sum(self.comm, partial, width)
     }
 
     /// What `of` gives for rows, `width` numbers each, of all ranks in one order, on every rank. Collective.
@@ -95,8 +89,14 @@ impl<'a> RowSpace<'a> {
 
     /// The lowest number that any rank names. Collective.
     pub fn lowest(&self, mine: Option<usize>) -> Option<usize> {
-        let lowest = self.maximum(mine.map_or(f64::NEG_INFINITY, |number| -(number as f64)));
-        (lowest != f64::NEG_INFINITY).then_some(-lowest as usize)
+        let mut lowest = [mine.map_or(i64::MIN, |number| -(number as i64))];
+        self.comm.reduce(Reduction::Largest, &mut lowest);
+        (lowest[0] != i64::MIN).then_some(-lowest[0] as usize)
+    }
+
+    /// Sums of counts over the ranks. Collective.
+    pub fn counts<const N: usize>(&self, mine: [u64; N]) -> [u64; N] {
+        sums(self.comm, mine)
     }
 
     /// Largest value over the ranks; NaN if any is.

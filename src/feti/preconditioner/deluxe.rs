@@ -15,10 +15,13 @@ use std::rc::Rc;
 use faer::prelude::Solve;
 use faer::{ColRef, Mat, Side};
 
-use crate::comm::{Comm, Shares};
+use crate::comm::Comm;
 use crate::constraint::{Constraints, Kind};
 use crate::feti::Torn;
+use crate::feti::dual::Interconnection;
 use crate::feti::dual::gather::Gather;
+use crate::feti::dual::levels::Halo;
+use crate::feti::dual::operator::Changes;
 use crate::feti::inverse::factor::Symbolic;
 use crate::feti::inverse::schur::Schur;
 use crate::sparse::cholesky::{Precision, Workspace};
@@ -28,8 +31,12 @@ use crate::work;
 /// The faces of one rank's subdomains.
 pub struct Deluxe<'a> {
     comm: &'a dyn Comm,
+    halo: &'a Halo<'a>,
     faces: Vec<GluedFace>,
     analyses: Vec<Analysed>,
+    /// Of subdomains by place, whether they are weak, and whether their tangents are fresh.
+    weak: Vec<bool>,
+    fresh: Vec<bool>,
     /// Whether any rank has a face with deluxe scaling.
     active: bool,
 }
@@ -53,7 +60,8 @@ struct GluedFace {
 
 /// A face of one of its subdomains.
 struct FaceSide {
-    subdomain: usize,
+    /// Its subdomain's place ([`Halo::place`]).
+    place: usize,
     rank: usize,
     own: Option<OwnSide>,
     /// Its stiffness, while the face is scaled by it.
@@ -70,7 +78,8 @@ struct OwnSide {
 
 impl<'a> Deluxe<'a> {
     /// Finds the faces. None has deluxe scaling before [`Deluxe::update`].
-    pub fn new(comm: &'a dyn Comm, shares: &Shares, constraints: &Constraints, gather: &Gather, schur: &Schur) -> Self {
+    pub fn new(connection: &'a Interconnection<'a>, constraints: &Constraints, schur: &Schur) -> Self {
+        let Interconnection { gather, halo, tree, .. } = connection;
         // How many rows touch a component of a node.
         let mut touching: HashMap<(u64, usize), usize> = HashMap::new();
         for row in &constraints.rows {
@@ -87,46 +96,56 @@ impl<'a> Deluxe<'a> {
                 rows_of.entry([a.subdomain, b.subdomain]).or_default().push(number as u32);
             }
         }
-        let first = shares.begin(comm.rank());
-        let side = |subdomain: usize, rows: &[u32]| {
-            let rank = shares.owner(subdomain);
-            let own = (rank == comm.rank()).then(|| OwnSide::new(subdomain - first, rows, gather, schur));
-            FaceSide { subdomain, rank, own, stiffness: None }
+        let side = |subdomain: u32, rows: &[u32]| {
+            let place = halo.place(subdomain) as usize;
+            let own = (place < tree.own()).then(|| OwnSide::new(place, rows, gather, schur));
+            FaceSide { place, rank: tree.home(subdomain as usize), own, stiffness: None }
         };
+        let is_own = |subdomain: &u32| tree.home(*subdomain as usize) == tree.comm().rank();
+        rows_of.retain(|pair, _| pair.iter().any(is_own));
         let face = |(pair, rows): ([u32; 2], Vec<u32>)| {
-            let sides = pair.map(|subdomain| side(subdomain as usize, &rows));
+            let sides = pair.map(|subdomain| side(subdomain, &rows));
             let values = rows.iter().map(|&row| constraints.rows[row as usize].terms[0].value).collect();
             GluedFace { rows, values, sides, share: None }
         };
-        let is_own = |face: &GluedFace| face.sides.iter().any(|side| side.own.is_some());
-        let faces = rows_of.into_iter().map(face).filter(is_own).collect();
-        Self { comm, faces, analyses: Vec::new(), active: false }
+        let faces = rows_of.into_iter().map(face).collect();
+        Self {
+            comm: tree.comm(),
+            halo,
+            faces,
+            analyses: Vec::new(),
+            weak: Vec::new(),
+            fresh: Vec::new(),
+            active: false,
+        }
     }
 
-    /// Whether an own subdomain is weak or shares a face with one that is, given which of all subdomains are.
-    pub fn is_beside(&self, own: usize, weak: &[bool]) -> bool {
+    /// Learns how subdomains here and beside have changed. One neighbour exchange. Collective.
+    pub fn meet(&mut self, changes: &Changes) {
+        let flags = changes.weak.iter().zip(&changes.fresh);
+        let mut flags: Vec<f64> =
+            flags.flat_map(|(weak, fresh)| [weak, fresh].map(|is| f64::from(u8::from(*is)))).collect();
+        self.halo.fill(&mut flags, 2);
+        (self.weak, self.fresh) = flags.as_chunks().0.iter().map(|[weak, fresh]| (*weak > 0.0, *fresh > 0.0)).unzip();
+        self.active = changes.is_any_weak;
+    }
+
+    /// Whether an own subdomain is weak or shares a face with one that is.
+    pub fn is_beside(&self, own: usize) -> bool {
         let is_own = |side: &FaceSide| side.own.as_ref().is_some_and(|side| side.own == own);
-        let is_scaled = |face: &&GluedFace| face.sides.iter().any(|side| weak[side.subdomain]);
+        let is_scaled = |face: &&GluedFace| face.sides.iter().any(|side| self.weak[side.place]);
         self.faces.iter().filter(is_scaled).any(|face| face.sides.iter().any(is_own))
     }
 
-    /// From now on faces beside `weak` subdomains have deluxe scaling, the others not. The stiffness of a side is taken again if its
-    /// subdomain is `fresh`: has a new tangent. Both lists are of all subdomains; `stiffness` gives analysis and lower values of
-    /// an own one. Collective.
-    pub fn update<'s>(
-        &mut self,
-        weak: &[bool],
-        fresh: &[bool],
-        schur: &Schur,
-        stiffness: impl Fn(usize) -> (&'s Symbolic, &'s [f64]),
-    ) {
-        self.active = weak.contains(&true);
+    /// From now on faces beside weak subdomains have deluxe scaling, the others not. The stiffness of a side is taken again if its
+    /// subdomain has a new tangent; `stiffness` gives analysis and lower values of an own one. Collective.
+    pub fn update<'s>(&mut self, schur: &Schur, stiffness: impl Fn(usize) -> (&'s Symbolic, &'s [f64])) {
         let mut changed = vec![false; self.faces.len()];
         let mut outgoing = vec![Vec::new(); self.comm.size()];
         for (face, changed) in self.faces.iter_mut().zip(&mut changed) {
-            let is_scaled = face.sides.iter().any(|side| weak[side.subdomain]);
+            let is_scaled = face.sides.iter().any(|side| self.weak[side.place]);
             for side in &mut face.sides {
-                side.stiffness = side.stiffness.take().filter(|_| is_scaled && !fresh[side.subdomain]);
+                side.stiffness = side.stiffness.take().filter(|_| is_scaled && !self.fresh[side.place]);
                 *changed |= is_scaled && side.stiffness.is_none();
             }
             face.share = face.share.take().filter(|_| is_scaled && !*changed);

@@ -8,12 +8,12 @@ pub mod scaling;
 use self::deluxe::Deluxe;
 use self::scaling::Scaling;
 use super::Torn;
+use super::dual::Interconnection;
 use super::dual::gather::Gather;
 use super::dual::operator::{Changes, DualOperator};
 use super::dual::space::RowSpace;
 use super::inverse::factor::NotDefinite;
 use super::inverse::schur::Schur;
-use crate::comm::{Comm, Shares};
 use crate::constraint::{Constraints, Entry};
 use crate::decomposition::Subdomain;
 use crate::monitor::timing::Timer;
@@ -41,14 +41,8 @@ pub struct Preconditioner<'a> {
 impl<'a> Preconditioner<'a> {
     /// With the boundary stiffness on the [`Gather::boundaries`] of the same `gather`. It gets its numbers by
     /// [`Preconditioner::interiors`] and [`Preconditioner::update`].
-    pub fn new(
-        comm: &'a dyn Comm,
-        shares: &Shares,
-        constraints: &Constraints,
-        gather: &'a Gather<'a>,
-        schur: Schur,
-    ) -> Self {
-        let deluxe = Deluxe::new(comm, shares, constraints, gather, &schur);
+    pub fn new(connection: &'a Interconnection<'a>, constraints: &Constraints, schur: Schur) -> Self {
+        let (gather, deluxe) = (&connection.gather, Deluxe::new(connection, constraints, &schur));
         let torn = gather.zeros();
         let place = |own: usize, dof| schur.boundary(own).binary_search(&dof).expect("rows touch boundary unknowns");
         let places = (0..torn.len())
@@ -88,18 +82,17 @@ impl<'a> Preconditioner<'a> {
         space: &RowSpace,
         timer: &Timer,
     ) -> Result<(), NotDefinite> {
-        let Changes { fresh, weak } = changes;
         let stiffness = (0..subdomains.len()).map(|own| operator.inverse.stiffness(own));
         let stiffness = stiffness.map(|(symbolic, values)| (&symbolic.pattern, values));
         self.scaling = timer.time("scaling", || Scaling::new(constraints, self.gather, stiffness));
-        let is_any_weak = weak.contains(&true);
-        if !is_any_weak && !self.deluxe.is_active() {
+        if !changes.is_any_weak && !self.deluxe.is_active() {
             return Ok(());
         }
-        let beside: Vec<usize> = (0..subdomains.len()).filter(|&own| self.deluxe.is_beside(own, weak)).collect();
-        operator.strengthen(subdomains, (&beside, is_any_weak), &mut self.schur, space, timer)?;
+        timer.time("faces", || self.deluxe.meet(changes));
+        let beside: Vec<usize> = (0..subdomains.len()).filter(|&own| self.deluxe.is_beside(own)).collect();
+        operator.strengthen(subdomains, (&beside, changes.is_any_weak), &mut self.schur, space, timer)?;
         let stiffness = |own: usize| operator.inverse.stiffness(own);
-        timer.time("faces", || self.deluxe.update(weak, fresh, &self.schur, stiffness));
+        timer.time("faces", || self.deluxe.update(&self.schur, stiffness));
         Ok(())
     }
 

@@ -1,8 +1,8 @@
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
-use super::Preconditioner;
 use super::scaling::Scaling;
+use super::{Changes, Preconditioner};
 use crate::constraint::Kind;
 use crate::decomposition::Subdomain;
 use crate::feti::inverse::factor::{Factors, analyse};
@@ -11,7 +11,6 @@ use crate::fixture::{
     Setup, assert_close, block_diagonal, built_in, column, dense, not_matching, on_ranks, same_on_any_ranks,
     two_bricks, two_bricks_by_metis,
 };
-use crate::model::discrete::Discrete;
 use crate::scene::Scene;
 use crate::sparse::cholesky::Precision;
 
@@ -41,9 +40,7 @@ impl<'a> Case<'a> {
         for (k, values) in stiffnesses.iter().enumerate() {
             schur.update(k, k, values, false).expect("the interior is held by its boundary");
         }
-        let Discrete { constraints, decomposition, .. } = &setup.discrete;
-        let shares = &decomposition.shares;
-        let mut preconditioner = Preconditioner::new(setup.comm, shares, constraints, &setup.gather, schur);
+        let mut preconditioner = Preconditioner::new(&setup.connection, &setup.discrete.constraints, schur);
         let stiffness = stiffnesses.iter().enumerate().map(|(k, values)| (&factors.symbolic(k).pattern, &values[..]));
         preconditioner.scaling = Scaling::new(&setup.discrete.constraints, &setup.gather, stiffness);
         preconditioner.scaling.restrict(&setup.discrete.constraints, kept);
@@ -53,10 +50,12 @@ impl<'a> Case<'a> {
     /// With deluxe scaling of all faces.
     fn deluxe(setup: &'a Setup<'a>) -> Self {
         let mut case = Self::new(setup, true, |_| true);
-        let (all, stiffnesses) = (vec![true; setup.discrete.decomposition.shares.total()], &case.stiffnesses);
+        let (all, stiffnesses) = (vec![true; setup.subdomains().len()], &case.stiffnesses);
+        let changes = Changes { fresh: all.clone(), weak: all, refreshed: 1, is_any_weak: true };
         let Preconditioner { deluxe, schur, .. } = &mut case.preconditioner;
         let stiffness = |own: usize| (&**case.factors.symbolic(own), &stiffnesses[own][..]);
-        deluxe.update(&all, &all, schur, stiffness);
+        deluxe.meet(&changes);
+        deluxe.update(schur, stiffness);
         assert!(deluxe.is_active());
         case
     }
@@ -215,9 +214,11 @@ fn deluxe_scaling_has_the_same_bits_on_any_ranks_and_ends_once_nothing_is_weak()
         let [plain, back] = [false, true].map(|was_deluxe| {
             same_on_any_ranks(&scene, |setup| {
                 let mut case = if was_deluxe { Case::deluxe(setup) } else { Case::new(setup, true, |_| true) };
-                let none = vec![false; setup.discrete.decomposition.shares.total()];
+                let none = vec![false; setup.subdomains().len()];
+                let changes = Changes { fresh: none.clone(), weak: none, refreshed: 0, is_any_weak: false };
                 let Preconditioner { deluxe, schur, .. } = &mut case.preconditioner;
-                deluxe.update(&none, &none, schur, |_| panic!("no face has a scaling of its own"));
+                deluxe.meet(&changes);
+                deluxe.update(schur, |_| panic!("no face has a scaling of its own"));
                 setup.owned(&case.apply(&setup.multipliers(12)))
             })
         });

@@ -28,7 +28,7 @@ use crate::work;
 pub struct Balance<'a> {
     tree: &'a Tree<'a>,
     motions: &'a Motions,
-    halo: Halo<'a>,
+    halo: &'a Halo<'a>,
     gluing: Gluing,
     levels: Vec<Level>,
     /// For each level, from 0, the inverses of the diagonal blocks of `G G'` of its groups that are at home here.
@@ -52,10 +52,9 @@ impl<'a> Balance<'a> {
         decomposition: &'a Decomposition,
         constraints: &Constraints,
     ) -> Result<Self, usize> {
-        let Decomposition { clusters, subdomains, shares, .. } = decomposition;
-        let Interconnection { gather, space, tree, motions, .. } = connection;
-        let halo = Halo::new(tree.comm(), shares, constraints);
-        let gluing = Gluing::new(clusters, subdomains, constraints, gather, &halo);
+        let Decomposition { clusters, subdomains, .. } = decomposition;
+        let Interconnection { gather, space, halo, tree, motions } = connection;
+        let gluing = Gluing::new(clusters, subdomains, constraints, gather, halo);
         let mut levels = Vec::new();
         for level in 1..=clusters.levels() {
             let inverses = stiffness::inverses(level, (clusters, tree, motions), subdomains, constraints, gather);

@@ -24,11 +24,9 @@ pub struct Halo<'a> {
 impl<'a> Halo<'a> {
     /// Of rows' blocks. Local: both ranks know which blocks they have in common.
     pub fn new(comm: &'a dyn Comm, shares: &Shares, constraints: &Constraints) -> Self {
-        let mut ends = vec![0];
-        shares.0.iter().for_each(|count| ends.push(ends[ends.len() - 1] + count));
-        let owner = |subdomain: u32| ends.partition_point(|&end| end <= subdomain as usize) - 1;
+        let owner = |subdomain: u32| shares.owner(subdomain as usize);
         let rank = comm.rank();
-        let (first, own) = (ends[rank], shares.0[rank]);
+        let (first, own) = (shares.begin(rank), shares.0[rank]);
         let mut plan: BTreeMap<usize, [BTreeSet<u32>; 2]> = BTreeMap::new();
         for subdomains in &constraints.block_subdomains {
             let of: Vec<(usize, u32)> = subdomains.iter().map(|&s| (owner(s), s)).collect();

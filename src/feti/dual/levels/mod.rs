@@ -12,6 +12,7 @@ pub mod stiffness;
 pub mod tree;
 
 pub use balance::Balance;
+pub use halo::Halo;
 pub use motions::Motions;
 pub use tree::Tree;
 
