@@ -64,8 +64,8 @@ impl<'a> Dual<'_, 'a> {
     /// `z = M r`; false if there is no preconditioner.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         let Some(preconditioner) = &mut self.preconditioner else { return false };
-        let apply = |r: &[f64], z: &mut [f64]| self.timer.time("preconditioner", || preconditioner.apply(r, z));
-        self.operator.precondition(r, z, apply);
+        let operator = &self.operator;
+        self.timer.time("preconditioner", || operator.precondition(r, z, |r, z| preconditioner.apply(r, z)));
         true
     }
 

@@ -51,6 +51,24 @@ impl RigidModes {
         matrix
     }
 
+    /// Unit translations, and unit rotations about the axes of coordinates through the same centre.
+    pub fn plain(&self) -> Self {
+        Self { centre: self.centre, translation: 1.0, axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
+    }
+
+    /// `R'v` from the force and the moment of `v`: what the [`RigidModes::plain`] modes make of it.
+    pub fn from_force(&self, [x, y, z, moment @ ..]: [f64; MODES]) -> [f64; MODES] {
+        let force = [x, y, z].map(|f| self.translation * f);
+        let turning = self.axes.map(|axis| dot(axis, moment));
+        std::array::from_fn(|k| if k < 3 { force[k] } else { turning[k - 3] })
+    }
+
+    /// The transpose: the translation and the rotation of these amplitudes.
+    pub fn to_motion(&self, amplitudes: [f64; MODES]) -> [f64; MODES] {
+        let rotation = |a: usize| (0..3).map(|k| amplitudes[3 + k] * self.axes[k][a]).sum();
+        std::array::from_fn(|k| if k < 3 { self.translation * amplitudes[k] } else { rotation(k - 3) })
+    }
+
     /// As numbers, to be sent.
     pub fn to_numbers(&self) -> [f64; 13] {
         let mut numbers = [0.0; 13];

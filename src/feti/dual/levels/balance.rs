@@ -75,12 +75,11 @@ impl<'a> Balance<'a> {
     pub fn forces(&self, mut resultants: Vec<f64>, forces: &mut [f64]) {
         forces.fill(0.0);
         for level in (1..=self.levels.len()).rev() {
-            let mut x = self.solve(level, &resultants);
-            self.halo.fill(&mut x, MODES);
-            self.gluing.add_moved(level, 1.0, &x, forces);
+            let x = self.solve(level, &resultants);
+            self.gluing.add_moved(self.halo, level..=level, 1.0, &x, forces);
             if level > 1 {
                 let mut taken = vec![0.0; resultants.len()];
-                self.gluing.add_resultants(level, forces, &mut taken);
+                self.gluing.add_resultants(level..=level, forces, &mut taken);
                 resultants.iter_mut().zip(taken).for_each(|(r, t)| *r -= t);
             }
         }
@@ -92,12 +91,10 @@ impl<'a> Balance<'a> {
         let mut motions = vec![0.0; MODES * self.tree.own()];
         for level in 1..=self.levels.len() {
             if level > 1 {
-                let mut all = motions.clone();
-                self.halo.fill(&mut all, MODES);
-                self.gluing.add_moved(level, -1.0, &all, jumps);
+                self.gluing.add_moved(self.halo, level..=level, -1.0, &motions, jumps);
             }
             let mut sums = vec![0.0; motions.len()];
-            self.gluing.add_resultants(level, jumps, &mut sums);
+            self.gluing.add_resultants(level..=level, jumps, &mut sums);
             motions.iter_mut().zip(self.solve(level, &sums)).for_each(|(a, x)| *a += x);
         }
         motions
@@ -117,15 +114,13 @@ impl<'a> Balance<'a> {
     fn relax_level(&self, level: usize, rows: &mut [f64]) {
         let above = level + 1..=self.levels.len() + 1;
         let mut sums = vec![0.0; MODES * self.tree.own()];
-        above.clone().for_each(|level| self.gluing.add_resultants(level, rows, &mut sums));
+        self.gluing.add_resultants(above.clone(), rows, &mut sums);
         let mut motions = self.sums(level, &sums);
         book(&self.diagonals[level]);
         for (six, inverse) in motions.as_chunks_mut::<MODES>().0.iter_mut().zip(&self.diagonals[level]) {
             *six = inverse.map(|line| line.iter().zip(&*six).map(|(a, x)| a * x).sum());
         }
-        let mut motions = self.of_members(level, motions);
-        self.halo.fill(&mut motions, MODES);
-        above.for_each(|level| self.gluing.add_moved(level, -1.0, &motions, rows));
+        self.gluing.add_moved(self.halo, above, -1.0, &self.of_members(level, motions), rows);
     }
 
     /// Motions `(G G')^+ r` of the members of the groups of a level, as motions of own subdomains; `r` are six numbers an own subdomain,

@@ -3,6 +3,8 @@
 //! A gluing row is of the lowest level on which one group has all its copies. It moves the members of that group against each
 //! other, and no larger group. Gluing between clusters and supports are of a level above all.
 
+use std::ops::RangeInclusive;
+
 use super::halo::Halo;
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::{Clusters, Subdomain};
@@ -12,18 +14,22 @@ use crate::work;
 
 /// `G` of one rank's equalities.
 pub struct Gluing {
-    levels: Vec<Rows>,
+    /// For each level the rows of each component of the displacement.
+    levels: Vec<[Rows; 3]>,
+    /// Modes of own subdomains.
+    modes: Vec<RigidModes>,
 }
 
-/// The rows of one level.
+/// Rows that compare one component of copies.
 #[derive(Default)]
 struct Rows {
     rows: Vec<u32>,
     /// First slot of each row, and the end.
     begin: Vec<u32>,
-    /// For each slot the place of its subdomain ([`Halo::place`]) and the values of its six modes.
+    /// For each slot the place of its subdomain ([`Halo::place`]).
     subdomain: Vec<u32>,
-    modes: Vec<[f64; MODES]>,
+    /// The slot's force along the component, and its moments about the two axes after it.
+    lever: Vec<[f64; 3]>,
 }
 
 impl Gluing {
@@ -35,58 +41,77 @@ impl Gluing {
         gather: &Gather,
         halo: &Halo,
     ) -> Self {
-        let mut levels: Vec<Rows> =
-            (0..=clusters.levels()).map(|_| Rows { begin: vec![0], ..Rows::default() }).collect();
+        let none = || [(); 3].map(|()| Rows { begin: vec![0], ..Rows::default() });
+        let mut levels: Vec<[Rows; 3]> = (0..=clusters.levels()).map(|_| none()).collect();
         let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.shape)).collect();
+        let plain: Vec<RigidModes> = modes.iter().map(RigidModes::plain).collect();
         gather.moved(
-            |own, node| modes[own].at(subdomains[own].shape[node]),
+            |own, node| plain[own].at(subdomains[own].shape[node]),
             |row, values| {
                 let Some(level) = level(clusters, constraints, row) else { return };
-                let of = &mut levels[level - 1];
-                let slots = constraints.slots(row);
+                let axis = constraints.rows[row].terms[0].axis;
+                let of = &mut levels[level - 1][axis];
                 of.rows.push(row as u32);
-                of.subdomain.extend(slots.map(|slot| halo.place(constraints.slot_subdomain[slot])));
-                of.modes.extend_from_slice(values);
+                of.subdomain.extend(constraints.slots(row).map(|slot| halo.place(constraints.slot_subdomain[slot])));
+                of.lever.extend(values.iter().map(|six| places(axis).map(|k| six[k])));
                 of.begin.push(of.subdomain.len() as u32);
             },
         );
-        Self { levels }
+        Self { levels, modes }
     }
 
-    /// `sums += G rows` for own subdomains, by the rows of one level.
-    pub fn add_resultants(&self, level: usize, rows: &[f64], sums: &mut [f64]) {
-        let of = &self.levels[level - 1];
-        of.book();
-        let sums = sums.as_chunks_mut::<MODES>().0;
-        for (&row, slots) in of.rows.iter().zip(of.begin.windows(2)) {
-            let x = rows[row as usize];
-            for slot in slots[0] as usize..slots[1] as usize {
-                if let Some(sum) = sums.get_mut(of.subdomain[slot] as usize) {
-                    sum.iter_mut().zip(&of.modes[slot]).for_each(|(sum, g)| *sum += x * g);
+    /// `sums += G rows` for own subdomains, by the rows of some levels.
+    pub fn add_resultants(&self, levels: RangeInclusive<usize>, rows: &[f64], sums: &mut [f64]) {
+        let mut forces = vec![[0.0; MODES]; self.modes.len()];
+        for (axis, of) in self.of_levels(levels) {
+            let [force, first, second] = places(axis);
+            for (&row, slots) in of.rows.iter().zip(of.begin.windows(2)) {
+                let x = rows[row as usize];
+                for slot in slots[0] as usize..slots[1] as usize {
+                    if let Some(sum) = forces.get_mut(of.subdomain[slot] as usize) {
+                        let lever = of.lever[slot];
+                        sum[force] += x * lever[0];
+                        sum[first] += x * lever[1];
+                        sum[second] += x * lever[2];
+                    }
                 }
+            }
+        }
+        for ((sum, modes), force) in sums.as_chunks_mut::<MODES>().0.iter_mut().zip(&self.modes).zip(forces) {
+            sum.iter_mut().zip(modes.from_force(force)).for_each(|(sum, x)| *sum += x);
+        }
+    }
+
+    /// `rows += factor G'a` in the rows of some levels, of six numbers an own subdomain. One neighbour exchange.
+    pub fn add_moved(&self, halo: &Halo, levels: RangeInclusive<usize>, factor: f64, a: &[f64], rows: &mut [f64]) {
+        let motions = a.as_chunks::<MODES>().0.iter().zip(&self.modes);
+        let mut motions: Vec<f64> = motions.flat_map(|(a, modes)| modes.to_motion(*a)).collect();
+        halo.fill(&mut motions, MODES);
+        let motions = motions.as_chunks::<MODES>().0;
+        for (axis, of) in self.of_levels(levels) {
+            let [way, first, second] = places(axis);
+            for (&row, slots) in of.rows.iter().zip(of.begin.windows(2)) {
+                let mut sum = 0.0;
+                for slot in slots[0] as usize..slots[1] as usize {
+                    let (lever, motion) = (of.lever[slot], &motions[of.subdomain[slot] as usize]);
+                    sum += lever[0] * motion[way] + lever[1] * motion[first] + lever[2] * motion[second];
+                }
+                rows[row as usize] += factor * sum;
             }
         }
     }
 
-    /// `rows += factor G'a` in the rows of one level, of six numbers an own subdomain and one of the halo.
-    pub fn add_moved(&self, level: usize, factor: f64, a: &[f64], rows: &mut [f64]) {
-        let of = &self.levels[level - 1];
-        of.book();
-        let a = a.as_chunks::<MODES>().0;
-        for (&row, slots) in of.rows.iter().zip(of.begin.windows(2)) {
-            let dot = |slot: usize| -> f64 {
-                of.modes[slot].iter().zip(&a[of.subdomain[slot] as usize]).map(|(g, a)| g * a).sum()
-            };
-            rows[row as usize] += factor * (slots[0] as usize..slots[1] as usize).map(dot).sum::<f64>();
-        }
+    /// The rows of some levels and their components, for a product with `G` or `G'`.
+    fn of_levels(&self, levels: RangeInclusive<usize>) -> impl Iterator<Item = (usize, &Rows)> {
+        let of_levels = self.levels[levels.start() - 1..*levels.end()].iter();
+        let of_axes = of_levels.flat_map(|of_axes| of_axes.iter().enumerate());
+        of_axes.inspect(|(_, of)| work::each(of.lever.len(), 6, size_of::<[f64; 3]>() + size_of::<u32>()))
     }
 }
 
-impl Rows {
-    /// Books a product with `G` or `G'`.
-    fn book(&self) {
-        work::each(self.modes.len(), 2 * MODES, size_of::<[f64; MODES]>() + size_of::<u32>());
-    }
+/// Which of the six numbers of a force and its moment one along this axis has.
+fn places(axis: usize) -> [usize; 3] {
+    [axis, 3 + (axis + 1) % 3, 3 + (axis + 2) % 3]
 }
 
 /// The level of a row that always holds.
