@@ -3,6 +3,7 @@
 use clap::Args;
 
 use super::room::Room;
+use super::solve::Cascade;
 use super::{Failure, Source, describe_run, find, values};
 use crate::comm::Comm;
 use crate::model;
@@ -17,6 +18,7 @@ use crate::results::replace::{self, Form};
 use crate::scene::Scene;
 use crate::sizing;
 use crate::sizing::counts::Counted;
+use crate::sizing::forecast::forecast;
 use crate::sizing::likeness::{Look, Refused};
 use crate::sizing::memory::Memory;
 
@@ -25,7 +27,7 @@ use crate::sizing::memory::Memory;
 pub struct Check {
     #[command(flatten)]
     source: Source,
-    /// Tell what each of so many ranks would hold, item by item.
+    /// Tell what each of so many ranks would hold, item by item, and how long the run would take.
     #[arg(long, value_name = "N", value_parser = values::ranks, allow_negative_numbers = true)]
     ranks: Option<usize>,
 }
@@ -64,6 +66,14 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
     monitor.event(&Event::Memory { megabytes, available_mb });
     let held = arguments.ranks.map(|ranks| (ranks, memory.held(ranks)));
     held.iter().for_each(|(ranks, rows)| monitor.event(&Event::Held { ranks: *ranks, rows: rows.clone() }));
+    // A level has as many cells along an edge.
+    let mut parts: Vec<f64> = Vec::new();
+    for level in Cascade::Auto.before(source.level, &scene) {
+        parts.push((level as f64 / source.level as f64).powi(3));
+    }
+    parts.push(1.0);
+    let forecast = arguments.ranks.map(|ranks| forecast(&sizes, &memory, ranks, &parts));
+    forecast.iter().for_each(|forecast| monitor.event(&Event::Forecast(forecast.clone())));
     warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
     if let Some(file) = &source.summary {
         let mut summary = Summary { sizes, warnings, contacts, title: scene.title.clone(), ..Summary::default() };
@@ -71,7 +81,7 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
         summary.memory_available_mb = available_mb;
         summary.mesh_reading_mb = reading_mb;
         if let Some((ranks, rows)) = held {
-            (summary.memory_ranks, summary.memory_of_rank) = (Some(ranks), rows);
+            (summary.memory_ranks, summary.memory_of_rank, summary.forecast) = (Some(ranks), rows, forecast);
         }
         describe_run(&mut summary, source, comm);
         results::write_json(comm, file, &summary)?;

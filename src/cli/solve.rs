@@ -52,7 +52,7 @@ pub enum Cascade {
 impl Cascade {
     /// The levels to solve before `level`, coarsest first. None where there is a history, of which a coarser
     /// level knows the end, or an earlier state, which is of one mesh, or a body that is no brick.
-    fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
+    pub(super) fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
         let linear = scene.contact.is_empty() && !scene.material.values().any(Law::yields);
         let possible = scene.step.is_empty() && scene.initial.is_none() && scene.is_of_bricks();
         if self == Self::Off || !possible || (self == Self::Auto && linear) {

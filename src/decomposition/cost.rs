@@ -26,27 +26,30 @@ const DEAR: f64 = 52.0;
 /// Numbers that could be read in the time that each subdomain takes besides.
 const OVERHEAD: f64 = 500.0;
 
-/// The coarse problem has at most about so many clusters: more are grouped again.
-pub const TOP: usize = 1500;
+/// The coarse problem has at most about so many blocks: more are grouped again.
+const TOP: usize = 1500;
+/// It has at most one block for so many subdomains, if that is more than [`FEW`]: every rank has all of it, so it would take most of
+/// the memory of many ranks.
+const SPARSE: usize = 50;
 
 /// Sizes of the groups of each level for so many subdomains of so many linear tetrahedra in all.
 pub fn groups(subdomains: usize, tetrahedra: u64) -> Vec<usize> {
-    let mut groups = levels(subdomains, cluster(subdomains, tetrahedra));
-    let mut count = groups.iter().fold(subdomains, |count, size| count.div_ceil(*size));
-    while count > TOP {
-        let size = if count <= 8 * TOP { 8 } else { 27 };
-        groups.push(size);
-        count = count.div_ceil(size);
-    }
-    groups
+    let (size, most) = (cluster(subdomains, tetrahedra), (subdomains / SPARSE).clamp(FEW, TOP));
+    // On several levels blocks of two an edge take fewer iterations than larger or longer ones.
+    let size = if size > 1 && subdomains.div_ceil(size) > most { 8 } else { size };
+    to(most, subdomains, size)
 }
 
 /// Sizes of the groups of each level if they are equal: as many levels as the coarse problem needs, one at least. Nothing if the
 /// size is one.
 pub fn levels(subdomains: usize, size: usize) -> Vec<usize> {
+    to(TOP, subdomains, size)
+}
+
+fn to(most: usize, subdomains: usize, size: usize) -> Vec<usize> {
     let mut groups = Vec::new();
     let mut count = subdomains;
-    while size > 1 && (groups.is_empty() || count > TOP) {
+    while size > 1 && (groups.is_empty() || count > most) {
         groups.push(size);
         count = count.div_ceil(size);
     }
@@ -68,7 +71,19 @@ fn cluster(subdomains: usize, tetrahedra: u64) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{cluster, subdomains};
+    use super::{cluster, groups, levels, subdomains};
+
+    #[test]
+    fn there_are_as_many_levels_as_the_coarse_problem_needs() {
+        let groups = |boxes: usize, cells: u64| groups(boxes, 6 * cells.pow(3) * boxes as u64);
+        assert!(groups(48, 10).is_empty());
+        assert_eq!(groups(1296, 5), [8]);
+        for boxes in [6000, 20_250, 93_750] {
+            assert_eq!(groups(boxes, 2), [8, 8], "{boxes}");
+        }
+        assert_eq!(groups(1_000_000, 2), [8; 4]);
+        assert_eq!((levels(6000, 8), levels(93_750, 27), levels(10, 1)), (vec![8], vec![27; 2], vec![]));
+    }
 
     #[test]
     fn many_small_subdomains_share_rigid_motions() {

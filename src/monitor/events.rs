@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::table::PhaseTable;
 use crate::record::counts::{ContactRow, HeldRow, Sizes};
+use crate::record::forecast::Forecast;
 use crate::record::rows::NewtonRow;
 use crate::record::state::{Errors, Residuals};
 
@@ -43,6 +44,8 @@ pub enum Event {
         /// Item by item.
         rows: Vec<HeldRow>,
     },
+    /// How long a run would take, from `check --ranks`.
+    Forecast(Forecast),
     /// An increment of the load is tried; where it leads to.
     Increment(String),
     /// The QP solver is at work; sent as often as it likes.

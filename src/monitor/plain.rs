@@ -6,6 +6,7 @@
 use super::events::{Event, Sink};
 use super::table::{Phase, PhaseTable, Spread};
 use crate::record::counts::{ContactRow, Counted, HeldRow, Sizes, Work};
+use crate::record::forecast::Forecast;
 use crate::record::rows::NewtonRow;
 use crate::record::state::{Errors, Residuals};
 
@@ -43,6 +44,7 @@ impl Plain {
                 vec![format!("  {:<16}{megabytes:>12.0}  MiB, all ranks together{left}", "memory estimate")]
             }
             Event::Held { ranks, rows } => held_lines(*ranks, rows),
+            Event::Forecast(forecast) => vec![forecast_line(forecast)],
             Event::NewtonStep(row) => {
                 let header = (!std::mem::replace(&mut self.newton_header_written, true)).then(newton_header);
                 header.into_iter().chain([newton_line(row)]).collect()
@@ -101,6 +103,15 @@ fn held_lines(ranks: usize, rows: &[HeldRow]) -> Vec<String> {
     let rows_of = rows.iter().map(|row| line(&row.item, row.owned_mb, row.everywhere_mb));
     let all = line("all", sum(|row| row.owned_mb), sum(|row| row.everywhere_mb));
     std::iter::once(header).chain(rows_of).chain([all]).collect()
+}
+
+fn forecast_line(Forecast { ranks, levels, seconds, messages }: &Forecast) -> String {
+    let applications: f64 = levels.last().map_or(0.0, |level| level.applications);
+    let share = 100.0 * messages / seconds;
+    format!(
+        "  about {seconds:.3} s on {ranks} of the cores it was measured on, {share:.0} % of it messages, with {applications:.0} \
+         multiplications by F on the finest mesh"
+    )
 }
 
 fn contact_line(ContactRow { name, slave, master, rule, conditions }: &ContactRow) -> String {

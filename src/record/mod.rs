@@ -3,6 +3,7 @@
 //! [`summary`] is all of a run, of [`counts`], [`rows`] and the last [`state`].
 
 pub mod counts;
+pub mod forecast;
 pub mod rows;
 pub mod state;
 pub mod summary;

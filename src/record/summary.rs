@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::counts::{CommunicationRow, ContactRow, Counted, Counters, HeldRow, Sizes, Work};
+use super::forecast::Forecast;
 use super::rows::{CascadeRow, NewtonRow, StepRow};
 use super::state::State;
 
@@ -69,6 +70,8 @@ pub struct Summary {
     pub memory_of_rank: Vec<HeldRow>,
     /// Ranks that this is for.
     pub memory_ranks: Option<usize>,
+    /// How long it would take on as many; from `check --ranks` only.
+    pub forecast: Option<Forecast>,
     /// Why the run failed.
     pub error: Option<String>,
     /// What the user should know.

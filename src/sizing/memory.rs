@@ -26,6 +26,8 @@ use crate::scene::{Precision, Preconditioner, Scene};
 pub struct Memory {
     /// What ranks hold while solving.
     pub items: Vec<Item>,
+    /// Numbers that subdomains take.
+    pub(super) numbers: Numbers,
     /// On each rank, at most, while meshes are read and cut, before anything else is there, in MiB.
     pub cutting_mb: f64,
 }
@@ -91,7 +93,7 @@ pub(super) struct Lengths {
 
 /// Numbers that subdomains take: their mesh, factors, matrices, vectors (with tangents, histories and results), bonds of
 /// groups, and slots of their rows.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Numbers(pub [f64; 6]);
 
 impl Numbers {
@@ -109,6 +111,11 @@ impl Numbers {
     /// Of the inverse of a group of so many members, where no other group is like it.
     pub fn of_group(members: f64) -> Self {
         Self([0.0, 0.0, 0.0, 0.0, (6.0 * (members - 1.0)).powi(2), 0.0])
+    }
+
+    /// Those in factors.
+    pub fn factors(&self) -> f64 {
+        self.0[1]
     }
 
     /// Of slots of rows.
@@ -160,10 +167,15 @@ impl Held {
             Item::everywhere("work on a factor", 12.0 * self.largest),
             Item::a_rank("lists of ranks", OF_RANK[0] + OF_RANK[1] * self.surfaces),
             Item::everywhere("coupled contact", COUPLED * coupled),
-            Item::everywhere("coarse problem", 2.0 * 8.0 * COARSE * self.coarse_blocks.powf(1.4)),
+            Item::everywhere("coarse problem", 2.0 * 8.0 * of_coarse(self.coarse_blocks)),
             Item::everywhere("lists of clusters", KNOWN * self.subdomains),
         ]
     }
+}
+
+/// Numbers in the factor of the coarse problem of so many blocks.
+pub(super) fn of_coarse(blocks: f64) -> f64 {
+    COARSE * blocks.powf(1.4)
 }
 
 pub(super) fn megabytes(bytes: f64) -> f64 {

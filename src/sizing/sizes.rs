@@ -84,7 +84,8 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
         surfaces: contacts.surfaces.len() as f64,
         largest,
     };
-    Memory { items: held.items(), cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)) }
+    let items = held.items();
+    Memory { items, numbers, cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)) }
 }
 
 /// How many members the groups have whose first subdomain is the rank's.

@@ -119,7 +119,7 @@ impl<'a> Counted<'a> {
         let elements = self.bodies.iter().filter(is_cut_at_once).map(|body| body.counts().elements as f64);
         let surfaces = self.scene.contact.values().flat_map(Contact::surfaces).count() as f64;
         let held = Held { numbers, subdomains, coarse_blocks, conditions, surfaces, largest };
-        Memory { items: held.items(), cutting_mb: megabytes(CUTTING * elements.sum::<f64>()) }
+        Memory { items: held.items(), numbers, cutting_mb: megabytes(CUTTING * elements.sum::<f64>()) }
     }
 
     /// Rows of all supports.

@@ -1,0 +1,146 @@
+//! How long a run on so many ranks would take.
+//!
+//! A run is a sum of amounts of work, each times the seconds of its unit. Amounts are what the rank with most has of it: its share
+//! of what ranks share, and what every rank does. They are for the whole run, for each Newton step, or for each application of the
+//! dual operator with all that goes with it (preconditioner, projections, inner products).
+//!
+//! | amount | is |
+//! |---|---|
+//! | `meshes` | unknowns: reading, cutting, analysis, results; for each step assembly, forces and residuals |
+//! | `rows` | slots of rows: set-up; for each application `B`, `B'`, `G` of groups, inner products |
+//! | `factors` | operations of the factors; for each application the numbers in them |
+//! | `coarse` | operations of the factor of the highest level, which every rank makes; numbers that a rank solves with |
+//! | `latency`, `collectives`, `bytes` | exchanges with neighbours one after the other; steps of trees of all ranks; bytes sent |
+//!
+//! Units come from runs of this machine and networks from outside: `bench-results/model.json`, which `scripts/bench write model` makes
+//! of measured runs. Counts of steps and applications grow with the logarithm of the subdomains there. A cascade is the sum of its
+//! levels. What is not in it: input and output of large files, waiting for ranks with more plastic elements, other programs.
+
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use super::memory::Memory;
+use crate::record::counts::Sizes;
+use crate::record::forecast::{Amount, Forecast, OfLevel, Per};
+
+/// What `scripts/bench write model` found.
+#[derive(Deserialize)]
+struct Model {
+    /// Seconds of a unit, by kind and how often it comes up.
+    units: Vec<Unit>,
+    /// Newton steps of a level without a start from a coarser one, and with one.
+    steps: [f64; 2],
+    /// Applications without and with such a start: those of one subdomain, and how many more for `ln` of the subdomains.
+    applications: [[f64; 2]; 2],
+}
+
+#[derive(Deserialize)]
+struct Unit {
+    of: String,
+    per: Per,
+    seconds: f64,
+}
+
+static MODEL: LazyLock<Model> = LazyLock::new(|| {
+    serde_json::from_str(include_str!("../../bench-results/model.json")).expect("the model is written by a script")
+});
+
+impl Model {
+    fn unit(&self, of: &str, per: Per) -> f64 {
+        self.units.iter().find(|unit| unit.of == of && unit.per == per).map_or(0.0, |unit| unit.seconds)
+    }
+}
+
+/// Kinds that are messages.
+const MESSAGES: [&str; 3] = ["latency", "collectives", "bytes"];
+/// Of a box among boxes.
+const NEIGHBOURS: f64 = 26.0;
+/// Exchanges of an application: `B` and the preconditioner; and for each level of groups, with as many on its tree.
+const EXCHANGES: [f64; 2] = [2.0, 5.0];
+/// Collectives of an application: inner products, and both halves of a projection's solve.
+const COLLECTIVES: f64 = 6.0;
+/// Parts of a factor of the coarse problem that are above all parts that ranks share, in a body: its last separator is `n^(2/3)` blocks.
+const SEPARATOR: f64 = 18.0;
+/// Solves of the coarse problem in an application.
+const SOLVES: f64 = 2.5;
+/// Bytes of a number.
+const NUMBER: f64 = 8.0;
+
+/// What solving a scene of these sizes takes on so many ranks, given which part of them each level of the cascade has, the finest last.
+pub fn forecast(sizes: &Sizes, memory: &Memory, ranks: usize, parts: &[f64]) -> Forecast {
+    let level = |(number, part): (usize, &f64)| of_level(sizes, memory, ranks, *part, number > 0);
+    let levels: Vec<OfLevel> = parts.iter().enumerate().map(level).collect();
+    let messages = |level: &OfLevel| seconds(level, |amount| MESSAGES.contains(&amount.of));
+    Forecast {
+        ranks,
+        seconds: levels.iter().map(|level| level.seconds).sum(),
+        messages: levels.iter().map(messages).sum(),
+        levels,
+    }
+}
+
+/// Of a level with this part of the subdomains.
+fn of_level(sizes: &Sizes, memory: &Memory, ranks: usize, part: f64, has_start: bool) -> OfLevel {
+    let start = usize::from(has_start);
+    let subdomains = part * sizes.subdomains as f64;
+    let [few, more] = MODEL.applications[start];
+    let (steps, applications) = (MODEL.steps[start], few + more * subdomains.max(1.0).ln());
+    let amounts = amounts(sizes, memory, ranks as f64, part);
+    let mut level = OfLevel { steps, applications, amounts, seconds: 0.0 };
+    level.seconds = seconds(&level, |_| true);
+    level
+}
+
+fn seconds(level: &OfLevel, counts: impl Fn(&Amount) -> bool) -> f64 {
+    let times = |per: Per| match per {
+        Per::Run => 1.0,
+        Per::Step => level.steps,
+        Per::Application => level.applications,
+    };
+    let of = |a: &Amount| a.amount * times(a.per) * MODEL.unit(a.of, a.per);
+    level.amounts.iter().filter(|a| counts(a)).map(of).sum()
+}
+
+fn amounts(sizes: &Sizes, memory: &Memory, ranks: f64, part: f64) -> Vec<Amount> {
+    let subdomains = part * sizes.subdomains as f64;
+    // Subdomains are whole.
+    let share = part * (sizes.subdomains as f64 / ranks).ceil().max(1.0) / sizes.subdomains as f64;
+    let [unknowns, rows] = [sizes.primal_dofs, sizes.dual_dofs].map(|n| n as f64);
+    let numbers = memory.numbers.factors();
+    let operations = (numbers / sizes.subdomains as f64).powf(1.5) * sizes.subdomains as f64;
+    let blocks = (part * sizes.coarse_blocks as f64).max(1.0);
+    let levels = if sizes.clusters == sizes.subdomains { 0.0 } else { groups(sizes) };
+    let length = super::memory::of_coarse(blocks);
+    let common = (SEPARATOR * blocks.powf(4.0 / 3.0)).min(length);
+    let mut amounts = Vec::new();
+    let mut add = |of, per, amount| amounts.push(Amount { of, per, amount });
+    add("meshes", Per::Run, share * unknowns);
+    add("meshes", Per::Step, share * unknowns);
+    add("rows", Per::Run, share * rows);
+    add("rows", Per::Application, share * rows);
+    add("factors", Per::Step, share * operations);
+    add("factors", Per::Application, share * numbers);
+    add("coarse", Per::Run, length * blocks.powf(0.6));
+    add("coarse", Per::Application, SOLVES * (common + (length - common) / ranks));
+    if ranks > 1.0 {
+        let neighbours = NEIGHBOURS.min(ranks - 1.0);
+        // Of a cube of subdomains the rows on its faces, of all that its subdomains have.
+        let own = subdomains / ranks;
+        let outside = (1.0 / own.max(1.0).cbrt()).min(1.0) * (1.0 - 1.0 / ranks);
+        let exchanges = EXCHANGES[0] + EXCHANGES[1] * levels;
+        add("latency", Per::Application, exchanges * neighbours);
+        add("collectives", Per::Application, COLLECTIVES * ranks.log2());
+        add("bytes", Per::Application, NUMBER * (2.0 + levels) * outside * share * rows);
+        let reduced = 400.0 * 4.0 + NUMBER * 6.0 * SOLVES * blocks;
+        add("bytes", Per::Application, reduced * ranks.log2());
+    }
+    amounts
+}
+
+/// Levels of groups, from the numbers of subdomains, clusters and blocks.
+fn groups(sizes: &Sizes) -> f64 {
+    let of = |a: u64, b: u64| (a as f64 / b as f64).ln();
+    let first = of(sizes.subdomains, sizes.clusters).max(f64::ln(2.0));
+    1.0 + (of(sizes.clusters, sizes.coarse_blocks) / first).round()
+}
