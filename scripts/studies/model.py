@@ -1,336 +1,446 @@
-"""A model of what a run costs, calibrated on measured runs, checked on others, and asked about machines that are not here.
+"""What a run costs: units fitted to measured runs, checked on others, and asked about machines that are not here.
 
-A run has S subdomains on p ranks and needs N Newton steps, F and P applications of the dual operator and of the preconditioner,
-and A active sets. Each part of its time is a unit cost times an amount of work:
+`fetiplast check --ranks N` counts the amounts of work of a run, as src/sizing/forecast.rs has them, and multiplies them by the
+seconds of a unit in bench-results/model.json. This writes that file. `run` measures: it solves the benchmark at several levels, with
+small and large subdomains, and asks `check` for the amounts of each of these runs, and of runs on up to 100,000 cores. `write` fits
+the units to all but the runs that are held back. Networks are not measured here: see `NETWORKS`.
 
-    factors     unit * flops / p
-    operator    unit * bytes of the factors read / p          preconditioner   likewise
-    elements    unit * N * primal unknowns / p
-    products    unit * (F + P) * dual unknowns / p
-    projections unit * (F + P) * dual unknowns / p, the sides of the coarse problem that are spread over the ranks
-    coarse      set-up + A * set-up for other rows + (F + P) * solve, whole on every rank, by the curves of the kernels
-    output      unit * primal unknowns
-
-Networks are not measured here. What messages cost between nodes is put in from outside, see `Network`.
+`run --kinds weak --ranks ...` is for a cluster (jobs/nodes): for each number of ranks it takes the subdomains and clusters that the
+forecast finds fastest, solves, and writes what was forecast beside what was measured.
 """
 
+import json
 import math
+import pathlib
 import statistics
-import typing
+import subprocess
+import tempfile
 
-from . import kernels, plot, scaling
+from . import kernels, measure, plot, scaling, study
+from .groups import Group, circumstances, thousands
 from .measure import RESULTS
 from .pages import table
 
+RAW = measure.RAW / "model"
 
-class Network(typing.NamedTuple):
-    """Assumed, not measured: what a good cluster's interconnect takes."""
-
-    latency: float = 2e-6
-    """Seconds from rank to rank."""
-    seconds_per_byte: float = 1e-10
-    """10 GB/s into every rank."""
-
-
-NEIGHBOURS = 26
-"""Of a box among boxes."""
-MEMORY = 4 * 2**30
-"""Bytes a core may have, on usual nodes."""
-A_CORE = 8
-"""Subdomains of a rank in the weak prediction."""
-
-
-class Curve:
-    """A quantity of the coarse problem over the number of subdomains: straight between measured points in logarithms; beyond
-    the last as nested dissection of a body in three dimensions promises."""
-
-    def __init__(self, lines, key, exponent):
-        self.points = sorted((line["subdomains"], line[key]) for line in lines)
-        self.exponent = exponent
-
-    def __call__(self, subdomains):
-        last, at_last = self.points[-1]
-        if subdomains >= last:
-            return at_last * (subdomains / last) ** self.exponent
-        pairs = list(zip(self.points, self.points[1:]))
-        (x0, y0), (x1, y1) = next((pair for pair in pairs if subdomains <= pair[1][0]), pairs[-1])
-        return y0 * (y1 / y0) ** (math.log(subdomains / x0) / math.log(x1 / x0))
-
-
-class Coarse:
-    def __init__(self, lines):
-        lines = [line for line in lines if line["kind"] == "coarse"]
-        self.setup, self.restricted = Curve(lines, "setup", 2), Curve(lines, "restricted", 2)
-        self.solve, self.length = Curve(lines, "solve", 4 / 3), Curve(lines, "length", 4 / 3)
-        self.measured = max(line["subdomains"] for line in lines)
-
-    def seconds(self, subdomains, sets, applications):
-        again = sets * self.restricted(subdomains) + applications * self.solve(subdomains)
-        return self.setup(subdomains) + again
-
-
-class Amounts(typing.NamedTuple):
-    """What a run does, all ranks together."""
-
-    subdomains: int
-    primal: float
-    dual: float
-    newton: float
-    operator: float
-    preconditioner: float
-    sets: float
-    flops: float
-    operator_bytes: float
-    preconditioner_bytes: float
-
-    @classmethod
-    def of(cls, summary):
-        work = summary["work"]
-        return cls(
-            summary["subdomains"], summary["primal_dofs"], summary["dual_dofs"], summary["newton_iterations"],
-            summary["hessian_multiplications"], summary["preconditioner_applications"], summary["active_set_iterations"],
-            work["factorisation"]["flops"] + work["factorisation of the interior"]["flops"],
-            work["dual operator"]["bytes"], work["preconditioner"]["bytes"],
-        )
-
-    def parts(self, ranks, coarse):
-        """Work on the critical path of each part."""
-        applications = self.operator + self.preconditioner
-        return {
-            "factors": self.flops / ranks,
-            "operator": self.operator_bytes / ranks,
-            "preconditioner": self.preconditioner_bytes / ranks,
-            "elements": self.newton * self.primal / ranks,
-            "products": applications * self.dual / ranks,
-            "projections": applications * self.dual / ranks,
-            "coarse": coarse.seconds(self.subdomains, self.sets, applications),
-            "output": self.primal,
-        }
-
-
-PHASES = {
-    "factors": ["factorisation", "factorisation of the interior", "symbolic analysis"],
-    "operator": ["dual operator"],
-    "preconditioner": ["preconditioner"],
-    "elements": ["assembly", "internal forces", "residuals", "scaling", "discretisation"],
-    "products": ["inner products"],
-    "projections": ["coarse problem", "coarse set-up"],
-    "output": ["output"],
+NETWORKS = {
+    "good": {"latency": 2e-6, "bandwidth": 1e10, "noise": 1e-6},
+    "slow": {"latency": 2e-5, "bandwidth": 1e9, "noise": 1e-5},
+    "noisy": {"latency": 2e-6, "bandwidth": 1e10, "noise": 5e-5},
 }
-"""Phases of the summary's `time` that make up a part, or two parts together."""
+"""Assumed: seconds from rank to rank, bytes a second into a rank, and seconds by which the slowest of all ranks is late in each step of
+a collective call. The first is in the program."""
+
+TIMED = [(1, 10, 1), (1, 10, 2), (2, 10, 1), (2, 10, 2), (3, 10, 2), (2, 5, 2), (3, 5, 2), (2, 2, 2), (3, 2, 2), (4, 2, 2)]
+"""Level, cells along an edge of a subdomain, ranks."""
+HELD = [(4, 10, 2), (4, 5, 2), (5, 2, 2)]
+"""Held back: larger than all others. The last has 93,750 subdomains."""
+
+WEAK = {1: (4, 1, 1), 10: (5, 2, 4), 100: (10, 5, 8), 1000: (25, 10, 16), 10_000: (50, 25, 32), 100_000: (100, 50, 80)}
+"""Boxes of 10^3 cells along the axes of each of the two bodies, by cores: eight a core."""
+STRONG = {cores: (50, 25, 40) for cores in (1000, 2000, 5000, 10_000, 20_000, 50_000)}
+"""100,000 subdomains, 4e8 unknowns."""
+MACHINES = {16: 64, 256: 64, 4096: 64}
+"""Cores of a node, by nodes: what a machine may have."""
+UNKNOWNS_A_CORE = 30_000
+"""Of the proposals."""
+CELLS, CLUSTERS = (5, 8, 10, 16), ("1", "8", "[8, 8]", "[8, 8, 8]")
+"""What proposals choose from."""
+
+FITS = [
+    (["discretisation", "interfaces", "symbolic analysis", "clusters", "interpolation", "output", "records", "error estimate"],
+     [("meshes", "run"), ("rows", "run")]),
+    (["assembly", "internal forces", "residuals", "certificate", "scaling"], [("meshes", "step")]),
+    (["factorisation", "factorisation of the interior"], [("factors", "step")]),
+    (["dual operator", "preconditioner", "refinement", "inner products", "coarse problem", "outside phases", "coarse set-up"],
+     [("factors", "application"), ("rows", "application")]),
+]
+"""Phases, and the amounts that they are fitted by. The coarse problem's own are known from the kernels and taken off before."""
+MESSAGES = ("latency", "collectives", "bytes")
 
 
-def seconds(group, part):
-    return statistics.median(sum(s["time"].get(phase, 0.0) for phase in PHASES[part]) for s in group.summaries)
+def arguments(parser):
+    parser.add_argument("--kinds", nargs="+", choices=["time", "forecast", "weak"], default=["time", "forecast"])
+    parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2], help="of weak runs")
+    parser.add_argument("--unknowns", type=int, default=UNKNOWNS_A_CORE, help="of weak runs, about, for each rank")
+    parser.add_argument("--out", type=pathlib.Path, help="folder of weak runs and their table instead of bench-results")
+    measure.add_repeat(parser, 1)
+    measure.add_arguments(parser)
 
 
-def calibrate(groups, coarse):
-    """Unit cost of each part: least squares of the relative error, so that small runs count as much as large ones. The coarse
-    problem is known from its curves: the runs that fit here are too small to tell its cost from that of the projections."""
-    units = {"coarse": 1.0}
-    for part in PHASES:
-        shares = []
-        for group in groups:
-            works = Amounts.of(group.first).parts(group.first["ranks"], coarse)
-            known = works["coarse"] if part == "projections" else 0.0
-            if (rest := seconds(group, part) - known) > 0.0:
-                shares.append(works[part] / rest)
-        units[part] = fit(shares)
+def run(arguments):
+    """Solves, then asks for the amounts of these runs and of those that are only predicted."""
+    program, failed = measure.Program(arguments), 0
+    if "weak" in arguments.kinds:
+        return weak(program, arguments)
+    if "time" in arguments.kinds:
+        runs = []
+        for level, cells, ranks in TIMED + HELD:
+            label = {"kind": "time", "level": level, "cells": cells, "ranks": ranks}
+            runs.append(measure.Run(label, ["two-blocks", "--level", str(level), *cut(cells)], ranks))
+        failed = measure.run(runs, arguments, RAW, ("time", "cascade"), program)
+    records = program.records(RAW)
+    for label, options in asked():
+        summary = check(program, [*options, "--ranks", str(label["ranks"])])
+        keys = ("subdomains", "clusters", "coarse_blocks", "primal_dofs", "dual_dofs", "memory_estimate_mb", "forecast")
+        record = {"kind": "forecast", **label, "summary": {key: summary[key] for key in keys}}
+        record["summary"]["rank_mb"] = sum(row["owned_mb"] + row["everywhere_mb"] for row in summary["memory_of_rank"])
+        record["provenance"] = program.provenance(summary) | {"date": measure.date(measure.now())}
+        records.add(record)
+    return 1 if failed else 0
+
+
+def weak(program, arguments):
+    """Runs of the size and with the subdomains that are forecast to be fastest, on each number of ranks."""
+    folder, failed, rows = arguments.out or RAW, 0, []
+    for ranks in arguments.ranks:
+        found = []
+        for label, options in choices({"kind": "weak", "ranks": ranks}, arguments.unknowns):
+            forecast = check(program, [*options, "--ranks", str(ranks)])["forecast"]
+            found.append((forecast["seconds"], label, options))
+        seconds, label, options = min(found, key=lambda choice: choice[0])
+        label = {**label, "forecast": seconds}
+        failed += measure.run([measure.Run(label, options, ranks)], arguments, folder, ("time", "counts", "cascade"), program)
+    for record in measure.read(folder):
+        if record["kind"] == "weak" and (summary := record["summary"]):
+            rows.append([
+                record["ranks"], thousands(summary["primal_dofs"]), f"{record['cells']}^3", record["cluster"],
+                summary["hessian_multiplications"], f"{record['forecast']:.3g}", f"{summary['time_total']:.3g}",
+            ])
+    head = ["ranks", "unknowns", "cells", "cluster", "applications of F", "seconds forecast", "seconds"]
+    (folder / "weak.md").write_text(table(head, rows))
+    return 1 if failed else 0
+
+
+def choices(label, unknowns):
+    """Scenes with about so many unknowns a rank that differ in their subdomains and clusters."""
+    level = max(1, round((label["ranks"] * unknowns / 3 / 6000) ** (1 / 3)))
+    for cells in CELLS:
+        # As many cells as boxes of this size divide.
+        edge = max(round(10 * level / cells), 1)
+        for cluster in CLUSTERS:
+            options = ["two-blocks", "--level", str(level), *blocks((3 * edge, edge, edge), cells), *cut(cells, cluster)]
+            yield {**label, "cells": cells, "cluster": cluster}, options
+
+
+def cut(cells, cluster=None):
+    options = ["--set", f"decomposition.cells=[{cells}, {cells}, {cells}]"]
+    return options + (["--set", f"decomposition.cluster={cluster}"] if cluster else [])
+
+
+def blocks(boxes, cells):
+    """The benchmark with so many boxes along the axes of each body."""
+    counts = [cells * n for n in boxes]
+    return [part for body in ("lower", "upper") for part in ("--set", f"body.{body}.brick.cells={counts}")]
+
+
+def asked():
+    """Labels and options of all that is only counted."""
+    for level, cells, ranks in TIMED + HELD:
+        yield {"of": "time", "level": level, "cells": cells, "ranks": ranks}, ["two-blocks", "--level", str(level), *cut(cells)]
+    # The cascade of a scene with these cells has as many levels as the benchmark's with as many subdomains.
+    for of, points in (("weak", WEAK), ("strong", STRONG)):
+        for cores, boxes in points.items():
+            for cluster in CLUSTERS:
+                label = {"of": of, "ranks": cores, "cells": 10, "cluster": cluster}
+                yield label, ["two-blocks", "--level", str(level_of(boxes)), *blocks(boxes, 10), *cut(10, cluster)]
+    for nodes, cores in MACHINES.items():
+        yield from choices({"of": "machine", "nodes": nodes, "ranks": nodes * cores}, UNKNOWNS_A_CORE)
+
+
+def level_of(boxes):
+    """The level of the benchmark with about as many boxes of its own."""
+    return max(1, round((math.prod(boxes) / 3) ** (1 / 3)))
+
+
+def check(program, options):
+    with tempfile.TemporaryDirectory() as folder:
+        summary = pathlib.Path(folder) / "summary.json"
+        command = [*program.on(1), "check", *options, "--summary", str(summary)]
+        subprocess.run(command, check=True, env=program.environment, stdout=subprocess.DEVNULL)
+        return json.loads(summary.read_text())
+
+
+def newest(records, keys):
+    """The last record of each kind."""
+    found = {}
+    for record in records:
+        found[tuple(str(record.get(key)) for key in keys)] = record
+    return list(found.values())
+
+
+def used(raw=RAW):
+    records = measure.read(raw)
+    times = [r for r in records if r["kind"] == "time" and r["exit_code"] == 0 and r["provenance"]["quiet"]]
+    groups = {}
+    for record in times:
+        groups.setdefault((record["level"], record["cells"], record["ranks"]), []).append(record)
+    timed = [record for records in groups.values() for record in Group(records).records]
+    asked = [r for r in records if r["kind"] == "forecast"]
+    return timed + newest(asked, ("of", "level", "cells", "ranks", "cluster", "nodes"))
+
+
+class Timed:
+    """Repetitions of a run, and its amounts."""
+
+    def __init__(self, records, forecast):
+        self.group, self.label = Group(records), records[0]
+        self.levels = forecast["summary"]["forecast"]["levels"]
+        summary = self.group.first
+        own = [*summary["cascade"], summary]
+        # The program's counts in place of the forecast's.
+        self.counts = [(level["newton_iterations"], level["hessian_multiplications"]) for level in own]
+
+    def amount(self, of, per):
+        """Of all levels, with the program's own counts."""
+        total = 0.0
+        for level, (steps, applications) in zip(self.levels, self.counts, strict=True):
+            times = {"run": 1, "step": steps, "application": applications}[per]
+            total += times * sum(a["amount"] for a in level["amounts"] if (a["of"], a["per"]) == (of, per))
+        return total
+
+    def seconds(self, phases):
+        return statistics.median(sum(s["time"].get(phase, 0.0) for phase in phases) for s in self.group.summaries)
+
+    def total(self):
+        return self.seconds([phase for phases, _ in FITS for phase in phases])
+
+    def predicted(self, units):
+        # Ranks of one machine: messages are not among these phases.
+        return sum(unit * self.amount(*key) for key, unit in units.items() if key[0] not in MESSAGES)
+
+
+def fit(rows, targets):
+    """Numbers, none below zero, for which the sums of `rows` times them are nearest to `targets`, relative to these."""
+    rows = [[x / t for x in row] for row, t in zip(rows, targets)]
+    found = [0.0] * len(rows[0])
+    for _ in range(2000):
+        for k in range(len(found)):
+            rest = [1 - sum(x * u for j, (x, u) in enumerate(zip(row, found)) if j != k) for row in rows]
+            square = sum(row[k] ** 2 for row in rows)
+            found[k] = max(0.0, sum(row[k] * r for row, r in zip(rows, rest)) / square) if square else 0.0
+    return found
+
+
+def coarse_units():
+    """Seconds of the coarse problem's units: one solve for a number in the factor, and the set-up for what it grows with."""
+    lines = [line for line in kernels.newest() if line["kind"] == "coarse" and line["subdomains"] <= 2000]
+    last = max(lines, key=lambda line: line["subdomains"])
+    return {
+        ("coarse", "run"): last["setup"] / (last["length"] * last["subdomains"] ** 0.6),
+        ("coarse", "application"): last["solve"] / last["length"],
+    }
+
+
+def calibrated(runs):
+    units = coarse_units()
+    known = dict(units)
+    for phases, keys in FITS:
+        rows = [[run.amount(*key) for key in keys] for run in runs]
+        is_coarse = "coarse problem" in phases
+        targets = [
+            run.seconds(phases) - (sum(u * run.amount(*key) for key, u in known.items()) if is_coarse else 0.0) for run in runs
+        ]
+        for key, unit in zip(keys, fit(rows, targets)):
+            units[key] = unit
     return units
 
 
-def fit(shares):
-    """The number x for which the products `x share` are as near to 1 as can be."""
-    return sum(shares) / sum(share * share for share in shares)
+def growth(points):
+    """`a + b ln S` through the points, of least squares; `b` is not below zero."""
+    xs, ys = zip(*[(math.log(s), y) for s, y in points])
+    slope, value = statistics.linear_regression(xs, ys)
+    return [value, slope] if slope > 0 else [statistics.mean(ys), 0.0]
 
 
-def predict(units, amounts, ranks, coarse):
-    return {part: units[part] * work for part, work in amounts.parts(ranks, coarse).items()}
+def counts_of(runs):
+    """Newton steps and applications, without and with a start from a coarser level, by the subdomains."""
+    points = {False: [], True: []}
+    for run in runs:
+        summary = run.group.first
+        for number, level in enumerate([*summary["cascade"], summary]):
+            points[number > 0].append((level["subdomains"], level["newton_iterations"], level["hessian_multiplications"]))
+    steps = [statistics.median(p[1] for p in points[started]) for started in (False, True)]
+    return steps, [growth([(p[0], p[2]) for p in points[started]]) for started in (False, True)]
 
 
-def total(group):
-    """What the model speaks of: the sum of the phases that it has."""
-    return sum(seconds(group, part) for part in PHASES)
-
-
-def split(groups):
-    """Runs to calibrate on, and those held back: all of the largest problem."""
-    largest = max(group.first["subdomains"] for group in groups)
-    return [g for g in groups if g.first["subdomains"] < largest], [g for g in groups if g.first["subdomains"] == largest]
-
-
-class Growth:
-    """A count as a + b ln S, by least squares over the runs of `cells` along an edge."""
-
-    def __init__(self, groups, key):
-        points = sorted({(math.log(g.first["subdomains"]), g.count(key)) for g in groups})
-        x, y = zip(*points)
-        self.slope, self.value = statistics.linear_regression(x, y) if len(points) > 1 else (0.0, y[0])
-
-    def __call__(self, subdomains):
-        return self.value + self.slope * math.log(subdomains)
-
-
-class Extrapolation:
-    """Amounts for any number of subdomains of the size of the largest measured problem."""
-
-    def __init__(self, groups):
-        summary = max(groups, key=lambda g: g.first["subdomains"]).first
-        self.base = Amounts.of(summary)
-        cubes = [g for g in groups if g.first["subdomains"] > 1]
-        self.newton = statistics.median(g.count("newton_iterations") for g in cubes)
-        keys = ("hessian_multiplications", "preconditioner_applications", "active_set_iterations")
-        self.operator, self.preconditioner, self.sets = (Growth(cubes, key) for key in keys)
-
-    def __call__(self, subdomains):
-        base, times = self.base, subdomains / self.base.subdomains
-        operator, preconditioner = self.operator(subdomains), self.preconditioner(subdomains)
-        return Amounts(
-            subdomains, base.primal * times, base.dual * times, self.newton, operator, preconditioner, self.sets(subdomains),
-            base.flops * times * self.newton / base.newton, base.operator_bytes * times * operator / base.operator,
-            base.preconditioner_bytes * times * preconditioner / base.preconditioner,
-        )
-
-
-def messages(amounts, ranks, calls, network):
-    """Seconds for exchanges with neighbours, and for collectives: `calls` for each application, each as deep as a tree of the
-    ranks, and six numbers of every subdomain to every rank."""
-    if ranks == 1:
-        return {"neighbours": 0.0, "collectives": 0.0}
-    applications = amounts.operator + amounts.preconditioner
-    surface = 8 * 2 * amounts.dual / ranks
-    gathered = 8 * 6 * amounts.subdomains
+def network_units(network):
+    step = network["latency"] + network["noise"]
     return {
-        "neighbours": applications * (NEIGHBOURS * network.latency + surface * network.seconds_per_byte),
-        "collectives": applications * (calls * network.latency * math.log2(ranks) + gathered * network.seconds_per_byte),
+        ("latency", "application"): network["latency"], ("collectives", "application"): step,
+        ("bytes", "application"): 1 / network["bandwidth"],
     }
+
+
+def forecast(record, units, steps, applications):
+    """Seconds of a run that was asked about: all, and of messages; and the applications on the finest level."""
+    total, messages, count = 0.0, 0.0, 0.0
+    levels = record["summary"]["forecast"]["levels"]
+    for number, level in enumerate(levels):
+        a, b = applications[number > 0]
+        count = a + b * math.log(max(level["subdomains"], 1))
+        times = {"run": 1, "step": steps[number > 0], "application": count}
+        for amount in level["amounts"]:
+            seconds = times[amount["per"]] * amount["amount"] * units.get((amount["of"], amount["per"]), 0.0)
+            total += seconds
+            messages += seconds if amount["of"] in MESSAGES else 0.0
+    return total, messages, count
 
 
 HEAD = """\
 # A model of the costs
 
-Written by `scripts/bench write model` from the runs in [raw/scaling](raw/scaling) and the coarse problems in
-[raw/kernels](raw/kernels). Each part of the time is a unit cost times an amount of work that the program counts; the
-formulas are at the top of [model.py](../scripts/studies/model.py). It tells what cannot be measured here, with all the caution
-that asks for: unit costs are those of this machine, networks are assumed ({latency:.0f} us from rank to rank, {rate:.0f} GB/s into
-every rank), counts grow as a + b ln S through the measured ones, and the coarse problem beyond {measured} subdomains grows as
-nested dissection promises (set-up with S^2, solve with S^4/3).
+Written by `scripts/bench write model` from the runs in [raw/model](raw/model), the coarse problems in [raw/kernels](raw/kernels) and
+the counts in [raw/study](raw/study). `fetiplast check --ranks N` counts the [amounts of work](../src/sizing/forecast.rs) of a run;
+here the seconds of their units are fitted to measured runs, and written to [model.json](model.json), by which it forecasts. It tells
+what cannot be measured here, with the caution that asks for: units are those of this machine, networks are assumed, and applications
+of F grow as a + b ln S through the measured ones. Input and output of files, and imbalance of plastic elements, are not in it.
 """
 
 
-def pages(folder=RESULTS, raw=scaling.RAW):
-    """Nothing from runs that other work ran beside: without two sizes of others there is no page."""
-    groups = [group for group in scaling.read(raw).values() if group.timed and group.first["work"].get("preconditioner")]
-    # Those of one size alone.
-    groups = [group for group in groups if not group.first["cascade"]]
-    cells = max((group.records[0]["cells"] for group in groups), default=None)
-    groups = [group for group in groups if group.records[0]["cells"] == cells]
-    if len({group.first["subdomains"] for group in groups}) < 2:
+def pages(folder=RESULTS, raw=RAW, counted=study.RAW):
+    records = used(raw)
+    asked = [r for r in records if r["kind"] == "forecast"]
+    runs, held = [], []
+    for places, into in ((TIMED, runs), (HELD, held)):
+        for level, cells, ranks in places:
+            key = {"level": level, "cells": cells, "ranks": ranks}
+            mine = [r for r in records if r["kind"] == "time" and all(r[k] == v for k, v in key.items())]
+            counts = [r for r in asked if r["of"] == "time" and all(r[k] == v for k, v in key.items())]
+            if mine and counts:
+                into.append(Timed(mine, counts[0]))
+    if len(runs) < 3:
         return {}
-    coarse, network = Coarse(kernels.newest()), Network()
-    known, held = split(groups)
-    units = calibrate(known, coarse)
-    text = [HEAD.format(latency=1e6 * network.latency, rate=1e-9 / network.seconds_per_byte, measured=coarse.measured)]
-    text += ["## Unit costs, and runs held back\n", *validation(units, known, held, coarse)]
-    weak, strong, plots, words = predictions(groups, units, coarse, network)
-    text += [f"## Weak: {A_CORE} subdomains of {cells}^3 cells on every core\n", weak, "![Weak](model-weak.svg)\n"]
-    text += ["## Strong\n", strong, "![Strong](model-strong.svg)\n", "## Where it ends\n", words]
-    return {folder / "model.md": "\n".join(text)} | {folder / name: chart for name, chart in plots.items()}
-
-
-def validation(units, known, held, coarse):
-    names = {"factors": "flop", "operator": "byte", "preconditioner": "byte", "elements": "unknown and Newton step"}
-    names |= {"products": "dual unknown and application", "output": "unknown"}
-    names["projections"] = names["products"]
-    cost = [[part, f"{unit:.3g}", f"s per {names[part]}"] for part, unit in units.items() if part in names]
-    yield table(["part", "unit cost", ""], cost)
-    yield f"From {len(known)} kinds of runs; all of the largest problem are held back. Predicted with their own counts:\n"
-    rows, errors = [], []
-    for group in [*known, *held]:
-        summary = group.first
-        predicted = sum(predict(units, Amounts.of(summary), summary["ranks"], coarse).values())
-        error = predicted / total(group) - 1
-        if group in held:
-            errors.append(abs(error))
-        label = group.records[0]
-        rows.append(
-            [f"level {label['level']}, width {label['width']}", summary["subdomains"], summary["ranks"], f"{total(group):.3g}"]
-            + [f"{predicted:.3g}", f"{100 * error:+.0f} %", "held back" if group in held else ""]
-        )
-    yield table(["run", "subdomains", "ranks", "seconds in these parts", "predicted", "error", ""], rows)
-    yield f"Largest error of a run held back: {100 * max(errors):.0f} %.\n"
-
-
-def predictions(groups, units, coarse, network):
-    """Weak and strong tables, plots, and what they say."""
-    extrapolation = Extrapolation(groups)
-    calls = statistics.median(
-        g.first["communication"]["collectives"]["calls"]
-        / (g.first["hessian_multiplications"] + g.first["preconditioner_applications"])
-        for g in groups
-    )
-
-    def at(subdomains, ranks):
-        amounts = extrapolation(subdomains)
-        return predict(units, amounts, ranks, coarse) | messages(amounts, ranks, calls, network), amounts
-
-    head = ["cores", "subdomains", "unknowns", "applications of F", "local s", "coarse s", "messages s", "total s", "efficiency"]
-    cores = [10**k for k in range(6)]
-
-    def rows(points, strong):
-        found, first = [], None
-        for ranks, subdomains in points:
-            parts, amounts = at(subdomains, ranks)
-            local = sum(parts[part] for part in units if part not in ("coarse", "output"))
-            sent = parts["neighbours"] + parts["collectives"]
-            # Results go to a file system, which is not part of the model.
-            whole = local + parts["coarse"] + sent
-            first = first or (ranks, whole)
-            efficiency = first[1] / whole * (first[0] / ranks if strong else 1)
-            found.append((ranks, subdomains, amounts, local, parts["coarse"], sent, whole, efficiency))
-        return found
-
-    def shown(found):
-        return table(
-            head,
-            [
-                [f"{p:,}".replace(",", " "), f"{s:,}".replace(",", " "), f"{a.primal:.2g}", f"{a.operator:.0f}"]
-                + [f"{x:.3g}" for x in (local, c, sent, whole)] + [f"{100 * e:.1f} %"]
-                for p, s, a, local, c, sent, whole, e in found
-            ],
-        )
-
-    weak = rows([(p, A_CORE * p) for p in cores], strong=False)
-    large = 10**5
-    strong = rows([(p, large) for p in cores if p >= 100], strong=True)
-
-    def series(found):
-        names = ["local work", "coarse problem", "messages", "total"]
-        return [(name, {r[0]: r[3 + k] for r in found if r[3 + k] > 0}, False) for k, name in enumerate(names)]
-
-    plots = {
-        "model-weak.svg": plot.curves(f"Predicted: {A_CORE} subdomains on every core", "cores", "seconds", series(weak)),
-        "model-strong.svg": plot.curves(f"Predicted: {large:,} subdomains".replace(",", " "), "cores", "seconds", series(strong)),
+    units, (steps, applications) = calibrated(runs), counts_of(runs + held)
+    good = units | network_units(NETWORKS["good"])
+    text = [HEAD, *of_units(good, steps, applications), *of_runs(runs, held, units), *of_counts(counted)]
+    text += [*of_weak(asked, units, steps, applications), *of_strong(asked, units, steps, applications)]
+    text += [*of_machines(asked, good, steps, applications), "## Where the runs come from\n"]
+    text.append(circumstances([r for r in records if r["kind"] == "time"]))
+    values = {
+        "units": [{"of": of, "per": per, "seconds": float(f"{unit:.4g}")} for (of, per), unit in sorted(good.items())],
+        "steps": steps,
+        "applications": [[float(f"{x:.4g}") for x in line] for line in applications],
     }
-    return shown(weak), shown(strong), plots, where(at, coarse, cores)
+    charts = {"model-weak.svg": chart(asked, "weak", good, steps, applications), "model-strong.svg": chart(asked, "strong", good, steps, applications)}
+    files = {folder / "model.md": "\n".join(text), folder / "model.json": json.dumps(values, indent=1) + "\n"}
+    return files | {folder / name: chart for name, chart in charts.items()}
 
 
-def where(at, coarse, cores):
-    """From which size on the coarse problem takes as long as all else, and no longer fits."""
+def of_units(units, steps, applications):
+    yield "## Units\n"
+    yield table(["amount", "of each", "seconds of a unit"], [[of, per, f"{unit:.3g}"] for (of, per), unit in sorted(units.items())])
+    network = ", ".join(f"{key} {value:g}" for key, value in NETWORKS["good"].items())
+    yield f"Messages are those of an assumed network ({network}; in seconds and bytes a second).\n"
+    lines = []
+    for name, n, (a, b) in zip(("without a start", "with one from a coarser level"), steps, applications):
+        lines.append([name, f"{n:.0f}", f"{a:.0f} + {b:.1f} ln S"])
+    yield table(["level", "Newton steps", "applications of F"], lines)
 
-    def first(holds):
-        fine = (round(10 ** (k / 20)) for k in range(20, 20 * 6))
-        return next((p for p in fine if holds(p)), None)
 
-    def share(p):
-        parts, _ = at(A_CORE * p, p)
-        return parts["coarse"] / sum(seconds for part, seconds in parts.items() if part != "output")
+def of_runs(runs, held, units):
+    yield "## Measured runs, and runs held back\n"
+    yield "With the cascade, predicted with their own counts of steps and applications; seconds without messages.\n"
+    rows, errors = [], []
+    for run in [*runs, *held]:
+        predicted, measured = run.predicted(units), run.total()
+        error = predicted / measured - 1
+        if run in held:
+            errors.append(abs(error))
+        label = run.label
+        rows.append([
+            f"level {label['level']}, {label['cells']}^3 cells", thousands(run.group.first["subdomains"]), label["ranks"],
+            f"{measured:.3g}", f"{predicted:.3g}", f"{100 * error:+.0f} %", "held back" if run in held else "",
+        ])
+    yield table(["run", "subdomains", "ranks", "seconds", "predicted", "error", ""], rows)
+    if errors:
+        yield f"Largest error of a run held back: {100 * max(errors):.0f} %.\n"
 
-    tenth, half = first(lambda p: share(p) > 0.1), first(lambda p: share(p) > 0.5)
-    full = first(lambda p: 8 * coarse.length(A_CORE * p) > MEMORY)
-    return (
-        f"With {A_CORE} subdomains a core the coarse problem takes a tenth of the time from {tenth} cores "
-        f"({A_CORE * tenth} subdomains) on and half of it from {half} cores ({A_CORE * half} subdomains) on. Its factor, which "
-        f"every rank holds whole, outgrows {MEMORY >> 30} GiB a core at {full} cores ({A_CORE * full} subdomains). That is the "
-        f"wall of the one-level method: beyond it the coarse problem must be smaller or spread over the ranks.\n"
-    )
+
+def of_counts(raw):
+    """Work of a rank on the most ranks, from that on fewer: a share and what every rank does."""
+    groups = [g for g in scaling.read(raw).values() if g.records[0]["kind"] == "strong"]
+    groups = {g.first["ranks"]: g for g in groups}
+    fewer = sorted(p for p in groups if 2 <= p < 64)
+    if 64 not in groups or len(fewer) < 2:
+        return
+    yield "## Counts held back: 64 ranks\n"
+    yield "Of the mean rank of the strong study; from 2 to 16 ranks: flops and bytes as a share and what every rank does, a / p + b.\n"
+    rows = []
+    for key in ("flops", "bytes"):
+        amount = {p: groups[p].first["counts_total"][key]["mean"] for p in (*fewer, 64)}
+        a, b = fit([[1 / p, 1] for p in fewer], [amount[p] for p in fewer])
+        predicted = a / 64 + b
+        rows.append([key, f"{amount[64]:.3g}", f"{predicted:.3g}", f"{100 * (predicted / amount[64] - 1):+.0f} %"])
+    yield table(["of a rank", "counted", "predicted", "error"], rows)
+
+
+def best(records, units, steps, applications):
+    """The fastest of some that differ in their clusters."""
+    return min(records, key=lambda r: forecast(r, units, steps, applications)[0])
+
+
+def points(asked, of, units, steps, applications):
+    cores = sorted({r["ranks"] for r in asked if r["of"] == of})
+    return {p: best([r for r in asked if r["of"] == of and r["ranks"] == p], units, steps, applications) for p in cores}
+
+
+def lines_of(asked, of, networks, units, steps, applications, first):
+    """A row for each number of cores, with the efficiency in each network relative to `first` cores."""
+    rows = []
+    found = {name: points(asked, of, units | network_units(n), steps, applications) for name, n in networks.items()}
+    for p in found["good"]:
+        record = found["good"][p]
+        row = [thousands(p), thousands(record["summary"]["subdomains"]), record["cluster"], thousands(record["summary"]["coarse_blocks"])]
+        for name, network in networks.items():
+            all_units = units | network_units(network)
+            time, messages, count = forecast(found[name][p], all_units, steps, applications)
+            start = forecast(found[name][first], all_units, steps, applications)[0]
+            efficiency = start / time * (first / p if of == "strong" else 1)
+            if name == "good":
+                row += [f"{count:.0f}", f"{time:.3g}", f"{messages:.3g}"]
+            row.append(f"{100 * efficiency:.0f} %")
+        rows.append(row)
+    head = ["cores", "subdomains", "clusters", "coarse blocks", "applications of F", "seconds", "of these messages"]
+    return table(head + [f"efficiency, {name} network" for name in networks], rows)
+
+
+def of_weak(asked, units, steps, applications):
+    yield "## Weak: 8 subdomains of 10^3 cells on every core\n"
+    yield "With the clusters that the model finds fastest; efficiency relative to 10 cores, with the growth of F in it.\n"
+    yield lines_of(asked, "weak", NETWORKS, units, steps, applications, 10)
+    yield "![Weak](model-weak.svg)\n"
+
+
+def of_strong(asked, units, steps, applications):
+    yield "## Strong: 4e8 unknowns in 100 000 subdomains\n"
+    yield "Efficiency relative to 1000 cores.\n"
+    yield lines_of(asked, "strong", NETWORKS, units, steps, applications, 1000)
+    yield "![Strong](model-strong.svg)\n"
+
+
+def of_machines(asked, units, steps, applications):
+    yield "## What to choose\n"
+    cores = next(iter(MACHINES.values()))
+    yield f"The fastest of {', '.join(map(str, CELLS))} cells along an edge and of some clusters, with about {thousands(UNKNOWNS_A_CORE)} unknowns a core.\n"
+    rows = []
+    for nodes in MACHINES:
+        record = best([r for r in asked if r["of"] == "machine" and r["nodes"] == nodes], units, steps, applications)
+        time, messages, count = forecast(record, units, steps, applications)
+        summary = record["summary"]
+        rows.append([
+            f"{thousands(nodes)} nodes of {cores}", f"{summary['primal_dofs']:.2g}", f"{record['cells']}^3", thousands(summary["subdomains"]),
+            record["cluster"], f"{count:.0f}", f"{time:.3g}", f"{100 * messages / time:.0f} %", thousands(round(summary["rank_mb"])),
+        ])
+    head = ["machine", "unknowns", "cells", "subdomains", "cluster", "applications of F", "seconds", "messages", "MiB a rank"]
+    yield table(head, rows)
+
+
+def chart(asked, of, units, steps, applications):
+    found = {p: forecast(r, units, steps, applications) for p, r in points(asked, of, units, steps, applications).items()}
+    series = [
+        ("total", {p: total for p, (total, _, _) in found.items()}, False),
+        ("messages", {p: messages for p, (_, messages, _) in found.items() if messages > 0}, False),
+    ]
+    title = "Predicted: 8 subdomains on every core" if of == "weak" else "Predicted: 100 000 subdomains"
+    return plot.curves(title, "cores", "seconds", series)

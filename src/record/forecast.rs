@@ -28,6 +28,8 @@ pub struct Amount {
 /// A level of the cascade, the finest last.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfLevel {
+    /// Subdomains, about.
+    pub subdomains: f64,
     /// Newton steps.
     pub steps: f64,
     /// Applications of the dual operator.

@@ -87,7 +87,7 @@ fn of_level(sizes: &Sizes, memory: &Memory, ranks: usize, part: f64, has_start: 
     let [few, more] = MODEL.applications[start];
     let (steps, applications) = (MODEL.steps[start], few + more * subdomains.max(1.0).ln());
     let amounts = amounts(sizes, memory, ranks as f64, part);
-    let mut level = OfLevel { steps, applications, amounts, seconds: 0.0 };
+    let mut level = OfLevel { subdomains, steps, applications, amounts, seconds: 0.0 };
     level.seconds = seconds(&level, |_| true);
     level
 }
@@ -105,7 +105,7 @@ fn seconds(level: &OfLevel, counts: impl Fn(&Amount) -> bool) -> f64 {
 fn amounts(sizes: &Sizes, memory: &Memory, ranks: f64, part: f64) -> Vec<Amount> {
     let subdomains = part * sizes.subdomains as f64;
     // Subdomains are whole.
-    let share = part * (sizes.subdomains as f64 / ranks).ceil().max(1.0) / sizes.subdomains as f64;
+    let share = (subdomains / ranks).ceil().max(1.0) / sizes.subdomains as f64;
     let [unknowns, rows] = [sizes.primal_dofs, sizes.dual_dofs].map(|n| n as f64);
     let numbers = memory.numbers.factors();
     let operations = (numbers / sizes.subdomains as f64).powf(1.5) * sizes.subdomains as f64;
@@ -143,4 +143,50 @@ fn groups(sizes: &Sizes) -> f64 {
     let of = |a: u64, b: u64| (a as f64 / b as f64).ln();
     let first = of(sizes.subdomains, sizes.clusters).max(f64::ln(2.0));
     1.0 + (of(sizes.clusters, sizes.coarse_blocks) / first).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::two_bricks;
+    use crate::sizing::counts::Counted;
+
+    fn of(ranks: usize, parts: &[f64]) -> Forecast {
+        let boxes = ["body.lower.brick.cells=[32, 16, 16]", "body.upper.brick.cells=[32, 16, 16]"];
+        let scene =
+            two_bricks(&[&boxes[..], &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=[8, 8]"]].concat());
+        let counted = Counted::new(&scene).expect("bodies are bricks");
+        forecast(&counted.sizes(), &counted.memory(), ranks, parts)
+    }
+
+    #[test]
+    fn every_amount_has_a_unit_and_shares_shrink_with_the_ranks() {
+        let [few, many] = [16, 64].map(|ranks| of(ranks, &[1.0]).levels[0].clone());
+        for (a, b) in few.amounts.iter().zip(&many.amounts) {
+            assert!(MODEL.units.iter().any(|unit| unit.of == a.of && unit.per == a.per), "{} {:?}", a.of, a.per);
+            assert_eq!((a.of, a.per), (b.of, b.per));
+            match a.of {
+                "meshes" | "rows" | "factors" => assert!((a.amount / b.amount - 4.0).abs() < 1e-12, "{}", a.of),
+                "coarse" if a.per == Per::Run => assert_eq!(a.amount, b.amount),
+                "coarse" => assert!(b.amount < a.amount && a.amount < 4.0 * b.amount),
+                "collectives" => assert!((b.amount / a.amount - 1.5).abs() < 1e-12),
+                _ => {}
+            }
+        }
+        assert!(many.seconds < few.seconds && few.seconds < 4.0 * many.seconds);
+    }
+
+    #[test]
+    fn a_forecast_is_the_sum_of_its_levels_and_one_rank_says_nothing() {
+        let alone = of(1, &[1.0]);
+        assert_eq!(alone.messages, 0.0);
+        assert!(alone.seconds > 0.0 && of(4, &[1.0]).messages > 0.0);
+        let cascade = of(4, &[0.125, 1.0]);
+        let [coarse, fine] = &cascade.levels[..] else { panic!("two levels") };
+        assert_eq!(cascade.seconds, coarse.seconds + fine.seconds);
+        assert!(coarse.seconds < fine.seconds && coarse.subdomains == fine.subdomains / 8.0);
+        // More ranks than subdomains help nobody.
+        let work = |ranks: usize| of(ranks, &[1.0]).seconds - of(ranks, &[1.0]).messages;
+        assert!(work(1 << 20) > 0.9 * work(1 << 14));
+    }
 }

@@ -65,7 +65,12 @@ fn a_result_deleted_under_the_run_is_written_all_the_same() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("out");
     let end = run_disturbed(2, &long(&out, &["--checkpoint-every", "0.2"]), |_| {
-        sleep(Duration::from_millis(900));
+        // While it is at work, not before and not behind: runs get faster.
+        let started = Instant::now();
+        let is_at_work = || fs::read_dir(&out).is_ok_and(|mut files| files.next().is_some());
+        while !is_at_work() && started.elapsed() < Duration::from_secs(10) {
+            sleep(Duration::from_millis(5));
+        }
         let _ = fs::remove_dir_all(&out);
     });
     assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
