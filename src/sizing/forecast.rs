@@ -29,10 +29,10 @@ use crate::record::forecast::{Amount, Forecast, OfLevel, Per};
 struct Model {
     /// Seconds of a unit, by kind and how often it comes up.
     units: Vec<Unit>,
-    /// Newton steps of a level without a start from a coarser one, and with one.
-    steps: [f64; 2],
-    /// Applications without and with such a start: those of one subdomain, and how many more for `ln` of the subdomains.
-    applications: [[f64; 2]; 2],
+    /// Newton steps of the first level of a cascade, of those between, and of the last or only one.
+    steps: [f64; 3],
+    /// Applications likewise: those of one subdomain, and how many more for `ln` of the subdomains.
+    applications: [[f64; 2]; 3],
 }
 
 #[derive(Deserialize)]
@@ -69,7 +69,8 @@ const NUMBER: f64 = 8.0;
 
 /// What solving a scene of these sizes takes on so many ranks, given which part of them each level of the cascade has, the finest last.
 pub fn forecast(sizes: &Sizes, memory: &Memory, ranks: usize, parts: &[f64]) -> Forecast {
-    let level = |(number, part): (usize, &f64)| of_level(sizes, memory, ranks, *part, number > 0);
+    let place = |number: usize| if number + 1 == parts.len() { 2 } else { number.min(1) };
+    let level = |(number, part): (usize, &f64)| of_level(sizes, memory, ranks, *part, place(number));
     let levels: Vec<OfLevel> = parts.iter().enumerate().map(level).collect();
     let messages = |level: &OfLevel| seconds(level, |amount| MESSAGES.contains(&amount.of));
     Forecast {
@@ -81,11 +82,10 @@ pub fn forecast(sizes: &Sizes, memory: &Memory, ranks: usize, parts: &[f64]) -> 
 }
 
 /// Of a level with this part of the subdomains.
-fn of_level(sizes: &Sizes, memory: &Memory, ranks: usize, part: f64, has_start: bool) -> OfLevel {
-    let start = usize::from(has_start);
+fn of_level(sizes: &Sizes, memory: &Memory, ranks: usize, part: f64, place: usize) -> OfLevel {
     let subdomains = part * sizes.subdomains as f64;
-    let [few, more] = MODEL.applications[start];
-    let (steps, applications) = (MODEL.steps[start], few + more * subdomains.max(1.0).ln());
+    let [few, more] = MODEL.applications[place];
+    let (steps, applications) = (MODEL.steps[place], few + more * subdomains.max(1.0).ln());
     let amounts = amounts(sizes, memory, ranks as f64, part);
     let mut level = OfLevel { subdomains, steps, applications, amounts, seconds: 0.0 };
     level.seconds = seconds(&level, |_| true);

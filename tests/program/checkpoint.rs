@@ -16,14 +16,14 @@ use serde_json::{Map, Value};
 /// Plastic flow, and contact that opens again.
 const HISTORY: &str = "step=[{increments=2}, {amplitude=0.2}]";
 /// A command line that solves two blocks, results in `out`.
-fn solve<'a>(out: &'a Path, sets: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
+pub fn solve<'a>(out: &'a Path, sets: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
     let mut arguments = vec!["solve", "two-blocks", "--progress", "off", "--out", out.to_str().unwrap()];
     arguments.extend(sets.iter().flat_map(|set| ["--set", *set]));
     arguments.extend(more);
     arguments
 }
 
-fn resume(ranks: usize, file: &Path) -> End {
+pub fn resume(ranks: usize, file: &Path) -> End {
     resume_with(ranks, file, &[])
 }
 
@@ -51,7 +51,7 @@ fn newton(out: &Path) -> Vec<u64> {
     summary["newton"].as_array().unwrap().iter().map(|row| row["increment"].as_u64().unwrap()).collect()
 }
 
-fn checkpoint(out: &Path) -> PathBuf {
+pub fn checkpoint(out: &Path) -> PathBuf {
     out.join("two-blocks.checkpoint.h5")
 }
 
@@ -72,7 +72,7 @@ fn result(out: &Path, name: &str) -> (Map<String, Value>, Bits) {
 }
 
 #[track_caller]
-fn assert_same_result(out: &Path, whole: &Path, name: &str) {
+pub fn assert_same_result(out: &Path, whole: &Path, name: &str) {
     let ((summary, bits), (summary_1, bits_1)) = (result(out, name), result(whole, name));
     for (key, value) in &summary_1 {
         assert_eq!(summary[key], *value, "{key}");

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::common::fields::Fields;
 use crate::common::{End, children, on_one_machine, run_disturbed, run_in_small_room, send, wait_for};

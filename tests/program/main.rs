@@ -20,6 +20,7 @@ mod initial;
 mod library;
 mod limits;
 mod loads;
+mod many;
 mod memory;
 mod mortar;
 mod patch;

@@ -17,7 +17,7 @@ fn result(run: &Run) -> Map<String, Value> {
 }
 
 /// Fails unless all runs have the same results to the last bit, which it returns.
-fn assert_independent_of_ranks(scene: &str, sets: &[&str], all_ranks: &[usize]) -> Map<String, Value> {
+pub fn assert_independent_of_ranks(scene: &str, sets: &[&str], all_ranks: &[usize]) -> Map<String, Value> {
     let mut first = None;
     for &ranks in all_ranks {
         let run = solve(ranks, scene, sets).converged();
