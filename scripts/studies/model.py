@@ -136,8 +136,9 @@ def cut(cells, cluster=None):
 def scene(boxes, cells, cluster):
     """The benchmark with about so many boxes of so many cells along the axes of each body, at the level from which a cascade begins
     with a few subdomains. Cells of a scene are those of its level 1."""
-    level = next(level for level in (10, 5, 2, 1) if min(boxes[1:]) >= level or level == 1)
-    counts = [cells * max(round(n / level), 1) for n in boxes]
+    fits = (level for level in (10, 5, 2) if min(boxes[1:]) >= level and all(cells * n % level == 0 for n in boxes))
+    level = next(fits, 1)
+    counts = [cells * n // level for n in boxes]
     sets = [part for body in ("lower", "upper") for part in ("--set", f"body.{body}.brick.cells={counts}")]
     return ["two-blocks", "--level", str(level), *sets, *cut(cells, cluster)]
 
@@ -245,6 +246,26 @@ def coarse_units():
 
 
 def calibrated(runs):
+    """Units by the unknowns of a subdomain: small ones stay in caches, and have short loops."""
+    found = {}
+    for cells in sorted({run.label["cells"] for run in runs}):
+        found[3 * (cells + 1) ** 3] = units_of([run for run in runs if run.label["cells"] == cells])
+    return found
+
+
+def units_at(found, unknowns):
+    """Between the measured sizes of subdomains straight in logarithms, beyond them as at the nearest."""
+    sizes = sorted(found)
+    upper = next((k for k, size in enumerate(sizes) if size >= unknowns), len(sizes) - 1)
+    lower = max(upper - 1, 0)
+    if upper == lower or unknowns >= sizes[upper]:
+        return found[sizes[upper]]
+    share = max(0.0, math.log(unknowns / sizes[lower]) / math.log(sizes[upper] / sizes[lower]))
+    low, high = found[sizes[lower]], found[sizes[upper]]
+    return {key: (1 - share) * low[key] + share * high[key] for key in low}
+
+
+def units_of(runs):
     units = coarse_units()
     known = dict(units)
     for phases, keys in FITS:
@@ -301,9 +322,14 @@ def network_units(network):
     }
 
 
+def in_network(units, network):
+    return {size: of_size | network_units(network) for size, of_size in units.items()}
+
+
 def forecast(record, units, steps, applications):
     """Seconds of a run that was asked about: all, and of messages; and the applications on the finest level."""
-    total, messages, count = 0.0, 0.0, 0.0
+    summary, (total, messages, count) = record["summary"], (0.0, 0.0, 0.0)
+    units = units_at(units, summary["primal_dofs"] / summary["subdomains"])
     levels = record["summary"]["forecast"]["levels"]
     for number, level in enumerate(levels):
         place = place_of(number, len(levels))
@@ -342,13 +368,19 @@ def pages(folder=RESULTS, raw=RAW, counted=study.RAW):
     if len(runs) < 3:
         return {}
     units, (steps, applications) = calibrated(runs), counts_of(runs + held)
-    good = units | network_units(NETWORKS["good"])
+    good = in_network(units, NETWORKS["good"])
     text = [HEAD, *of_units(good, steps, applications), *of_runs(runs, held, units), *of_counts(counted)]
     text += [*of_weak(asked, units, steps, applications), *of_strong(asked, units, steps, applications)]
     text += [*of_machines(asked, good, steps, applications), "## Where the runs come from\n"]
     text.append(circumstances([r for r in records if r["kind"] == "time"]))
     values = {
-        "units": [{"of": of, "per": per, "seconds": float(f"{unit:.4g}")} for (of, per), unit in sorted(good.items())],
+        "sizes": [
+            {
+                "unknowns": size,
+                "units": [{"of": of, "per": per, "seconds": float(f"{unit:.4g}")} for (of, per), unit in sorted(units.items())],
+            }
+            for size, units in good.items()
+        ],
         "steps": steps,
         "applications": [[float(f"{x:.4g}") for x in line] for line in applications],
     }
@@ -359,7 +391,10 @@ def pages(folder=RESULTS, raw=RAW, counted=study.RAW):
 
 def of_units(units, steps, applications):
     yield "## Units\n"
-    yield table(["amount", "of each", "seconds of a unit"], [[of, per, f"{unit:.3g}"] for (of, per), unit in sorted(units.items())])
+    sizes = sorted(units)
+    rows = [[of, per, *(f"{units[size][of, per]:.3g}" for size in sizes)] for of, per in sorted(units[sizes[0]])]
+    yield "Seconds, by the unknowns of a subdomain.\n"
+    yield table(["amount", "of each", *map(thousands, sizes)], rows)
     network = ", ".join(f"{key} {value:g}" for key, value in NETWORKS["good"].items())
     yield f"Messages are those of an assumed network ({network}; in seconds and bytes a second).\n"
     lines = []
@@ -375,10 +410,11 @@ def of_runs(runs, held, units):
         "times seconds of each. *By the scene*: amounts that `check` tells beforehand, with the run's own steps and applications; it "
         "cannot know how much yields, so how many congruent subdomains share a factor.\n"
     )
-    known, rows, errors = by_counts(runs), [], []
+    rows, errors = [], []
     for run in [*runs, *held]:
-        measured = run.total()
-        found = [run.predicted_by_counts(known), run.predicted(units)]
+        measured, cells = run.total(), run.label["cells"]
+        known = by_counts([other for other in runs if other.label["cells"] == cells])
+        found = [run.predicted_by_counts(known), run.predicted(units[3 * (cells + 1) ** 3])]
         ratios = [predicted / measured - 1 for predicted in found]
         if run in held:
             errors.append([abs(ratio) for ratio in ratios])
@@ -425,12 +461,12 @@ def points(asked, of, units, steps, applications):
 def lines_of(asked, of, networks, units, steps, applications, first):
     """A row for each number of cores, with the efficiency in each network relative to `first` cores."""
     rows = []
-    found = {name: points(asked, of, units | network_units(n), steps, applications) for name, n in networks.items()}
+    found = {name: points(asked, of, in_network(units, n), steps, applications) for name, n in networks.items()}
     for p in found["good"]:
         record = found["good"][p]
         row = [thousands(p), thousands(record["summary"]["subdomains"]), record["cluster"], thousands(record["summary"]["coarse_blocks"])]
         for name, network in networks.items():
-            all_units = units | network_units(network)
+            all_units = in_network(units, network)
             time, messages, count = forecast(found[name][p], all_units, steps, applications)
             start = forecast(found[name][first], all_units, steps, applications)[0]
             efficiency = start / time * (first / p if of == "strong" else 1)

@@ -27,12 +27,20 @@ use crate::record::forecast::{Amount, Forecast, OfLevel, Per};
 /// What `scripts/bench write model` found.
 #[derive(Deserialize)]
 struct Model {
-    /// Seconds of a unit, by kind and how often it comes up.
-    units: Vec<Unit>,
+    /// By the size of subdomains, the smallest first.
+    sizes: Vec<OfSize>,
     /// Newton steps of the first level of a cascade, of those between, and of the last or only one.
     steps: [f64; 3],
     /// Applications likewise: those of one subdomain, and how many more for `ln` of the subdomains.
     applications: [[f64; 2]; 3],
+}
+
+#[derive(Deserialize)]
+struct OfSize {
+    /// Of a subdomain.
+    unknowns: f64,
+    /// Seconds of a unit, by kind and how often it comes up.
+    units: Vec<Unit>,
 }
 
 #[derive(Deserialize)]
@@ -47,6 +55,17 @@ static MODEL: LazyLock<Model> = LazyLock::new(|| {
 });
 
 impl Model {
+    /// Between the measured sizes straight in logarithms, beyond them as at the nearest.
+    fn unit(&self, of: &str, per: Per, unknowns: f64) -> f64 {
+        let above = self.sizes.partition_point(|size| size.unknowns < unknowns).min(self.sizes.len() - 1);
+        let (low, high) = (&self.sizes[above.saturating_sub(1)], &self.sizes[above]);
+        let width = (high.unknowns / low.unknowns).ln();
+        let share = if width > 0.0 { ((unknowns / low.unknowns).ln() / width).clamp(0.0, 1.0) } else { 1.0 };
+        (1.0 - share) * low.unit(of, per) + share * high.unit(of, per)
+    }
+}
+
+impl OfSize {
     fn unit(&self, of: &str, per: Per) -> f64 {
         self.units.iter().find(|unit| unit.of == of && unit.per == per).map_or(0.0, |unit| unit.seconds)
     }
@@ -72,7 +91,8 @@ pub fn forecast(sizes: &Sizes, memory: &Memory, ranks: usize, parts: &[f64]) -> 
     let place = |number: usize| if number + 1 == parts.len() { 2 } else { number.min(1) };
     let level = |(number, part): (usize, &f64)| of_level(sizes, memory, ranks, *part, place(number));
     let levels: Vec<OfLevel> = parts.iter().enumerate().map(level).collect();
-    let messages = |level: &OfLevel| seconds(level, |amount| MESSAGES.contains(&amount.of));
+    let unknowns = sizes.primal_dofs as f64 / sizes.subdomains as f64;
+    let messages = |level: &OfLevel| seconds(level, unknowns, |amount| MESSAGES.contains(&amount.of));
     Forecast {
         ranks,
         seconds: levels.iter().map(|level| level.seconds).sum(),
@@ -88,17 +108,17 @@ fn of_level(sizes: &Sizes, memory: &Memory, ranks: usize, part: f64, place: usiz
     let (steps, applications) = (MODEL.steps[place], few + more * subdomains.max(1.0).ln());
     let amounts = amounts(sizes, memory, ranks as f64, part);
     let mut level = OfLevel { subdomains, steps, applications, amounts, seconds: 0.0 };
-    level.seconds = seconds(&level, |_| true);
+    level.seconds = seconds(&level, sizes.primal_dofs as f64 / sizes.subdomains as f64, |_| true);
     level
 }
 
-fn seconds(level: &OfLevel, counts: impl Fn(&Amount) -> bool) -> f64 {
+fn seconds(level: &OfLevel, unknowns: f64, counts: impl Fn(&Amount) -> bool) -> f64 {
     let times = |per: Per| match per {
         Per::Run => 1.0,
         Per::Step => level.steps,
         Per::Application => level.applications,
     };
-    let of = |a: &Amount| a.amount * times(a.per) * MODEL.unit(a.of, a.per);
+    let of = |a: &Amount| a.amount * times(a.per) * MODEL.unit(a.of, a.per, unknowns);
     level.amounts.iter().filter(|a| counts(a)).map(of).sum()
 }
 
@@ -163,7 +183,7 @@ mod tests {
     fn every_amount_has_a_unit_and_shares_shrink_with_the_ranks() {
         let [few, many] = [16, 64].map(|ranks| of(ranks, &[1.0]).levels[0].clone());
         for (a, b) in few.amounts.iter().zip(&many.amounts) {
-            assert!(MODEL.units.iter().any(|unit| unit.of == a.of && unit.per == a.per), "{} {:?}", a.of, a.per);
+            assert!(MODEL.sizes.iter().all(|size| size.units.iter().any(|unit| unit.of == a.of && unit.per == a.per)));
             assert_eq!((a.of, a.per), (b.of, b.per));
             match a.of {
                 "meshes" | "rows" | "factors" => assert!((a.amount / b.amount - 4.0).abs() < 1e-12, "{}", a.of),

@@ -3,7 +3,7 @@
 //!
 //! [`Msh`] is what a file says about volumes and surfaces, and a rank's share in their nodes and cells; [`volume`] takes one
 //! body out of it. Of large binary files of version 4.1 each rank reads its own bytes (`ranges`); others rank 0 reads, and
-//! deals them out (`deal`). Points, lines, node data,
+//! deals them out (`deal`). Files of VTKHDF are taken for such meshes too (`vtkhdf`). Points, lines, node data,
 //! periodicity and parametric coordinates are read over. Files come from users, so nothing in them is trusted: memory
 //! follows what is there, not what is announced.
 
@@ -20,6 +20,7 @@ mod surface;
 mod version2;
 mod version4;
 pub mod volume;
+mod vtkhdf;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -29,7 +30,7 @@ use std::path::Path;
 pub use error::Problem;
 pub use kind::Kind;
 
-use crate::comm::Comm;
+use crate::comm::{Comm, decide};
 use deal::{Look, told};
 use error::Place;
 use nodes::NodeTags;
@@ -104,6 +105,9 @@ impl Msh {
     /// # Errors
     /// If it cannot be read, or is no sound mesh; the same on every rank.
     pub fn read(comm: &dyn Comm, path: &Path, large: u64) -> Result<Self, Problem> {
+        if decide(comm, comm.rank() == 0 && is_hdf5(path)) {
+            return vtkhdf::read(comm, path);
+        }
         let looked = if comm.rank() == 0 { Self::look(path, large) } else { Ok(Look::Whole(Self::default())) };
         let look = told(comm, looked)?;
         deal::deal(comm, path, look)
@@ -174,6 +178,13 @@ impl Msh {
         };
         self.blocks.iter().map(part).collect()
     }
+}
+
+/// Whether a file begins as HDF5 files do. Pipes are not looked into.
+fn is_hdf5(path: &Path) -> bool {
+    let mut begin = [0; vtkhdf::SIGNATURE.len()];
+    let is_file = path.metadata().is_ok_and(|about| about.is_file());
+    is_file && File::open(path).and_then(|mut file| file.read_exact(&mut begin)).is_ok() && begin == vtkhdf::SIGNATURE
 }
 
 #[cfg(test)]
