@@ -24,12 +24,12 @@ from .pages import table
 RAW = measure.RAW / "model"
 
 NETWORKS = {
-    "good": {"latency": 2e-6, "bandwidth": 1e10, "noise": 1e-6},
-    "slow": {"latency": 2e-5, "bandwidth": 1e9, "noise": 1e-5},
-    "noisy": {"latency": 2e-6, "bandwidth": 1e10, "noise": 5e-5},
+    "good": {"latency": 2e-6, "overhead": 3e-7, "bandwidth": 1e10, "noise": 1e-6},
+    "slow": {"latency": 2e-5, "overhead": 2e-6, "bandwidth": 1e9, "noise": 1e-5},
+    "noisy": {"latency": 2e-6, "overhead": 3e-7, "bandwidth": 1e10, "noise": 5e-5},
 }
-"""Assumed: seconds from rank to rank, bytes a second into a rank, and seconds by which the slowest of all ranks is late in each step of
-a collective call. The first is in the program."""
+"""Assumed: seconds from rank to rank, seconds in which a rank sends or takes a message, bytes a second into a rank, and seconds by which
+the slowest of all ranks is late in each step of a collective call (LogP: Culler et al. 1993). The first is in the program."""
 
 TIMED = [(1, 10, 1), (1, 10, 2), (2, 10, 1), (2, 10, 2), (3, 10, 2), (2, 5, 2), (3, 5, 2), (2, 2, 2), (3, 2, 2), (4, 2, 2)]
 """Level, cells along an edge of a subdomain, ranks."""
@@ -61,7 +61,7 @@ BY_BYTES += ["certificate", "scaling", "internal forces", "records", "error esti
 BY_FLOPS = ["assembly", "factorisation", "factorisation of the interior", "coarse set-up"]
 BY_UNKNOWNS = ["discretisation", "interfaces", "symbolic analysis", "clusters", "interpolation", "output"]
 """Phases by what the program counts of them."""
-MESSAGES = ("latency", "collectives", "bytes")
+MESSAGES = ("exchanges", "messages", "collectives", "bytes")
 
 
 def arguments(parser):
@@ -317,7 +317,8 @@ def place_of(number, levels):
 def network_units(network):
     step = network["latency"] + network["noise"]
     return {
-        ("latency", "application"): network["latency"], ("collectives", "application"): step,
+        ("exchanges", "application"): network["latency"], ("messages", "application"): network["overhead"],
+        ("collectives", "application"): step,
         ("bytes", "application"): 1 / network["bandwidth"],
     }
 

@@ -10,7 +10,8 @@
 //! | `rows` | slots of rows: set-up; for each application `B`, `B'`, `G` of groups, inner products |
 //! | `factors` | operations of the factors; for each application the numbers in them |
 //! | `coarse` | operations of the factor of the highest level, which every rank makes; numbers that a rank solves with |
-//! | `latency`, `collectives`, `bytes` | exchanges with neighbours one after the other; steps of trees of all ranks; bytes sent |
+//! | `exchanges`, `messages` | exchanges with several ranks at once, one after the other; messages of all of them |
+//! | `collectives`, `bytes` | steps of trees of all ranks; bytes sent or received |
 //!
 //! Units come from runs of this machine and networks from outside: `bench-results/model.json`, which `scripts/bench write model` makes
 //! of measured runs. Counts of steps and applications grow with the logarithm of the subdomains there. A cascade is the sum of its
@@ -21,6 +22,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::memory::Memory;
+use crate::feti::inverse::kernel::MODES;
 use crate::record::counts::Sizes;
 use crate::record::forecast::{Amount, Forecast, OfLevel, Per};
 
@@ -72,17 +74,21 @@ impl OfSize {
 }
 
 /// Kinds that are messages.
-const MESSAGES: [&str; 3] = ["latency", "collectives", "bytes"];
+const MESSAGES: [&str; 4] = ["exchanges", "messages", "collectives", "bytes"];
 /// Of a box among boxes.
 const NEIGHBOURS: f64 = 26.0;
-/// Exchanges of an application: `B` and the preconditioner; and for each level of groups, with as many on its tree.
-const EXCHANGES: [f64; 2] = [2.0, 5.0];
+/// Exchanges of an application with neighbours: `B` and the preconditioner, and for each level of groups.
+const EXCHANGES: [f64; 2] = [2.0, 4.0];
+/// Passes along the tree of groups, for each level as many as it is high; and the ranks that one is with.
+const TREE: [f64; 2] = [8.0, 4.0];
 /// Collectives of an application: inner products, and both halves of a projection's solve.
 const COLLECTIVES: f64 = 6.0;
 /// Parts of a factor of the coarse problem that are above all parts that ranks share, in a body: its last separator is `n^(2/3)` blocks.
 const SEPARATOR: f64 = 18.0;
 /// Solves of the coarse problem in an application.
 const SOLVES: f64 = 2.5;
+/// Bytes of the sums in an application: a few long integers.
+const REDUCED: f64 = 2400.0;
 /// Bytes of a number.
 const NUMBER: f64 = 8.0;
 
@@ -144,16 +150,19 @@ fn amounts(sizes: &Sizes, memory: &Memory, ranks: f64, part: f64) -> Vec<Amount>
     add("coarse", Per::Run, length * blocks.powf(0.6));
     add("coarse", Per::Application, SOLVES * (common + (length - common) / ranks));
     if ranks > 1.0 {
-        let neighbours = NEIGHBOURS.min(ranks - 1.0);
+        let active = ranks.min(subdomains.ceil());
+        let neighbours = NEIGHBOURS.min(active - 1.0).max(0.0);
         // Of a cube of subdomains the rows on its faces, of all that its subdomains have.
         let own = subdomains / ranks;
         let outside = (1.0 / own.max(1.0).cbrt()).min(1.0) * (1.0 - 1.0 / ranks);
         let exchanges = EXCHANGES[0] + EXCHANGES[1] * levels;
-        add("latency", Per::Application, exchanges * neighbours);
+        let passes = TREE[0] * levels * (levels + 1.0) / 2.0;
+        add("exchanges", Per::Application, exchanges + passes);
+        add("messages", Per::Application, exchanges * neighbours + passes * TREE[1].min(neighbours));
         add("collectives", Per::Application, COLLECTIVES * ranks.log2());
         add("bytes", Per::Application, NUMBER * (2.0 + levels) * outside * share * rows);
-        let reduced = 400.0 * 4.0 + NUMBER * 6.0 * SOLVES * blocks;
-        add("bytes", Per::Application, reduced * ranks.log2());
+        // Long integers of inner products, and what the coarse problem gets of each block.
+        add("bytes", Per::Application, REDUCED * ranks.log2() + NUMBER * MODES as f64 * SOLVES * blocks);
     }
     amounts
 }
