@@ -50,7 +50,9 @@ fn a_rank_killed_among_64_ends_all_of_them_soon() {
     let end = run_disturbed(MANY, &solve(out.path(), &LEVELS, &slowly), |launcher| {
         wait_for(&checkpoint(out.path()), 1);
         killed = Instant::now();
-        send("KILL", children(launcher)[MANY / 2]);
+        let ranks = children(launcher);
+        assert_eq!(ranks.len(), MANY, "{launcher}: {ranks:?}");
+        send("KILL", ranks[MANY / 2]);
     });
     assert!(end.code != 0, "{}", end.stdout);
     assert!(killed.elapsed() < ALL_GONE, "{:?}", killed.elapsed());

@@ -227,8 +227,9 @@ pub fn run_short_of_memory(ranks: usize, arguments: &[&str], kibibytes: usize) -
 
 /// Processes that a process has started.
 pub fn children(process: u32) -> Vec<u32> {
-    let text = fs::read_to_string(format!("/proc/{process}/task/{process}/children")).unwrap_or_default();
-    text.split_whitespace().map(|child| child.parse().unwrap()).collect()
+    let threads = fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
+    let of_threads = threads.map(|thread| fs::read_to_string(thread.path().join("children")).unwrap_or_default());
+    of_threads.collect::<String>().split_whitespace().map(|child| child.parse().unwrap()).collect()
 }
 
 /// Waits until a file has been written, anew, so many times; not for ever.
