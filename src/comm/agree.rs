@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use crate::comm::{Comm, all_gather_text};
+use crate::comm::{Comm, all_gather_text, from_root};
 
 /// The value if every rank succeeded; otherwise, on every rank, the text of the first rank that failed at `task`.
 /// Collective.
@@ -37,8 +37,7 @@ pub fn root_texts<'a>(comm: &dyn Comm, texts: impl IntoIterator<Item = &'a str>)
             packed.push(0);
         }
     }
-    let received = comm.all_to_all(vec![packed; comm.size()]).swap_remove(0);
-    received
+    from_root(comm, packed)
         .split_inclusive(|&b| b == 0)
         .map(|text| {
             let bytes: Vec<u8> = text[..text.len() - 1].iter().map(|&b| b as u8).collect();

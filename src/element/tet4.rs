@@ -18,7 +18,7 @@ impl Element<4, 1> for Tet4 {
     const VTK: u8 = 10;
     const GMSH: Gmsh = Gmsh { cell: 4, face: 2, order: &[0, 1, 2, 3], needs: None };
 
-    #[inline]
+    #[inline(always)]
     fn points(corners: &Nodal<4>) -> Option<[Point<4>; 1]> {
         (Self::shape(corners) > DEGENERATE).then(|| {
             let (determinant, [a, b, c]) = edges(corners);
@@ -62,6 +62,7 @@ impl Element<4, 1> for Tet4 {
 }
 
 /// Six times the signed volume, and the edges from corner 0.
+#[inline(always)]
 fn edges(corners: &[[f64; 3]; 4]) -> (f64, [[f64; 3]; 3]) {
     let [a, b, c] = [1, 2, 3].map(|n| std::array::from_fn(|i| corners[n][i] - corners[0][i]));
     (dot(a, cross(b, c)), [a, b, c])
