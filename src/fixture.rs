@@ -167,7 +167,10 @@ impl<'a> Deref for Setup<'a> {
 
 impl<'a> Setup<'a> {
     pub fn new(scene: &Scene, comm: &'a dyn Comm) -> Self {
-        let discrete = model::discretise(scene, comm).expect("the scene has a discrete problem");
+        Self::of(model::discretise(scene, comm).expect("the scene has a discrete problem"), comm)
+    }
+
+    pub fn of(discrete: Discrete, comm: &'a dyn Comm) -> Self {
         let connection = Interconnection::new(comm, &discrete.decomposition, &discrete.constraints);
         Self { comm, discrete, connection }
     }

@@ -181,7 +181,7 @@ mod tests {
                     if size > 3 { size as f64 - 1.0 } else { 0.0 }
                 );
                 assert_eq!(of_largest(comm, f64::NAN, [rank]), [0.0]);
-                assert_eq!(from_root(comm, vec![u64::MAX, 7].repeat(1 + comm.rank())), [u64::MAX, 7]);
+                assert_eq!(from_root(comm, [u64::MAX, 7].repeat(1 + comm.rank())), [u64::MAX, 7]);
                 assert!(decide(comm, comm.rank() == 0));
                 let swapped = comm.all_to_all((0..size).map(|to| vec![comm.rank() as u64, to as u64]).collect());
                 for (from, pair) in swapped.iter().enumerate() {

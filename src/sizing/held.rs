@@ -71,7 +71,7 @@ mod tests {
     use crate::comm::watched::Watched;
     use crate::decomposition::sums::NodeSums;
     use crate::decomposition::twins::twins;
-    use crate::fixture::{not_matching, two_bricks};
+    use crate::fixture::{Setup, not_matching, two_bricks};
     use crate::model::discretise;
     use crate::scene::Scene;
     use crate::sizing;
@@ -122,6 +122,49 @@ mod tests {
         }
         let mortar = built(&not_matching(&[]));
         assert!(mortar.items.iter().any(|item| item.name == GROWING[0] && item.everywhere > 0.0));
+    }
+
+    /// Grouped again and again, a scene of any size has a coarse problem of few blocks.
+    #[test]
+    fn the_coarse_problem_that_every_rank_holds_has_a_bound() {
+        let of = |edge: usize| {
+            let cells =
+                ["lower", "upper"].map(|body| format!("body.{body}.brick.cells=[{0}, {edge}, {edge}]", 2 * edge));
+            let scene = two_bricks(&[&cells[0][..], &cells[1][..], "decomposition.cells=[1, 1, 1]"]);
+            let counted = Counted::new(&scene).expect("bodies are bricks");
+            let items = counted.memory().items;
+            let coarse = items.iter().find(|item| item.name == "coarse problem").expect("there is one");
+            (counted.sizes().coarse_blocks, coarse.everywhere)
+        };
+        let largest = [16, 40, 64, 100, 160, 256, 400].map(of);
+        assert!(largest.iter().all(|(blocks, bytes)| *blocks < 1700 && *bytes < 1e8), "{largest:?}");
+    }
+
+    /// Of an application of the dual operator with its projection, the longest message that is for all: with as many blocks in the
+    /// coarse problem it does not depend on how many subdomains are below them.
+    #[test]
+    fn what_all_ranks_are_told_in_an_application_does_not_grow_with_the_scene() {
+        let longest = [("[8, 4, 4]", "8"), ("[16, 8, 8]", "[8, 8]")].map(|(cells, cluster)| {
+            let sets = ["lower", "upper"].map(|body| format!("body.{body}.brick.cells={cells}"));
+            let cluster = format!("decomposition.cluster={cluster}");
+            let scene = two_bricks(&[&sets[0][..], &sets[1], "decomposition.cells=[1, 1, 1]", &cluster]);
+            let of_ranks = threads::run(6, |comm| {
+                let discrete = discretise(&scene, comm).expect("the scene has a discrete problem");
+                let watched = Watched::new(comm);
+                let setup = Setup::of(discrete, &watched);
+                let coarse = setup.coarse().expect("supports hold both bodies");
+                let x = setup.multipliers(1);
+                let (mut operator, mut y) = (setup.operator(), x.clone());
+                operator.apply(&x, &mut y);
+                setup.space.dots(&[(&x, &y), (&x, &x)]);
+                let mut a = coarse.apply(&y);
+                coarse.solve(&mut a);
+                watched.longest()
+            });
+            of_ranks.into_iter().max()
+        });
+        assert_eq!(longest[0], longest[1]);
+        assert!(longest[0] > Some(0));
     }
 
     /// Of setting up a problem, the longest message that is for all.

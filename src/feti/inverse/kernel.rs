@@ -57,7 +57,7 @@ impl RigidModes {
     }
 
     /// `R'v` from the force and the moment of `v`: what the [`RigidModes::plain`] modes make of it.
-    pub fn from_force(&self, [x, y, z, moment @ ..]: [f64; MODES]) -> [f64; MODES] {
+    pub fn of_force(&self, [x, y, z, moment @ ..]: [f64; MODES]) -> [f64; MODES] {
         let force = [x, y, z].map(|f| self.translation * f);
         let turning = self.axes.map(|axis| dot(axis, moment));
         std::array::from_fn(|k| if k < 3 { force[k] } else { turning[k - 3] })

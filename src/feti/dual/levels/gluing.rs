@@ -78,7 +78,7 @@ impl Gluing {
             }
         }
         for ((sum, modes), force) in sums.as_chunks_mut::<MODES>().0.iter_mut().zip(&self.modes).zip(forces) {
-            sum.iter_mut().zip(modes.from_force(force)).for_each(|(sum, x)| *sum += x);
+            sum.iter_mut().zip(modes.of_force(force)).for_each(|(sum, x)| *sum += x);
         }
     }
 
