@@ -439,12 +439,16 @@ def of_counts(raw):
     if 64 not in groups or len(fewer) < 2:
         return
     yield "## Counts held back: 64 ranks\n"
-    yield "Of the mean rank of the strong study; from 2 to 16 ranks: flops and bytes as a share and what every rank does, a / p + b.\n"
+    yield "Of the mean rank of the strong study; from 2 to 16 ranks: a share, its surface, and what every rank does, a / p + b / p^(2/3) + c.\n"
     rows = []
     for key in ("flops", "bytes"):
         amount = {p: groups[p].first["counts_total"][key]["mean"] for p in (*fewer, 64)}
-        a, b = fit([[1 / p, 1] for p in fewer], [amount[p] for p in fewer])
-        predicted = a / 64 + b
+
+        def parts(p):
+            return [1 / p, p ** (-2 / 3), 1]
+
+        found = fit([parts(p) for p in fewer], [amount[p] for p in fewer])
+        predicted = sum(x * part for x, part in zip(found, parts(64)))
         rows.append([key, f"{amount[64]:.3g}", f"{predicted:.3g}", f"{100 * (predicted / amount[64] - 1):+.0f} %"])
     yield table(["of a rank", "counted", "predicted", "error"], rows)
 

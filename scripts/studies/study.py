@@ -177,7 +177,7 @@ def growth_table(curve):
         longest = [e["largest_message"]["busiest"] for e in each]
         received = [e["bytes_received"]["busiest"] for e in each]
         if longest[-1]:
-            grows = max((values[-1] / values[0]) for values in (longest, received) if values[0])
+            grows = max(((values[-1] / values[0]) for values in (longest, received) if values[0]), default=1.0)
             told = "with the ranks" if grows > 0.7 * shown[-1] / shown[0] else "" if grows < 1.3 else "slowly"
             rows.append([name, *(f"{x / 1024:.1f}" for x in longest), *map(mib, received), told])
     return table(head, sorted(rows, key=lambda row: row[-1] != "with the ranks"))
