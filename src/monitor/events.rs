@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::table::PhaseTable;
-use crate::record::counts::{ContactRow, HeldRow, Sizes};
-use crate::record::forecast::Forecast;
+use crate::record::counts::{ContactRow, Sizes};
+use crate::record::forecast::{Forecast, HeldRow};
 use crate::record::rows::NewtonRow;
 use crate::record::state::{Errors, Residuals};
 

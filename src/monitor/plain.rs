@@ -5,8 +5,8 @@
 
 use super::events::{Event, Sink};
 use super::table::{Phase, PhaseTable, Spread};
-use crate::record::counts::{ContactRow, Counted, HeldRow, Sizes, Work};
-use crate::record::forecast::Forecast;
+use crate::record::counts::{ContactRow, Counted, Sizes, Work};
+use crate::record::forecast::{Forecast, HeldRow};
 use crate::record::rows::NewtonRow;
 use crate::record::state::{Errors, Residuals};
 

@@ -52,17 +52,6 @@ pub struct ContactRow {
     pub conditions: u64,
 }
 
-/// What a rank holds of an item.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct HeldRow {
-    /// Its name.
-    pub item: String,
-    /// The rank's share, in MiB.
-    pub owned_mb: f64,
-    /// What every rank holds, in MiB.
-    pub everywhere_mb: f64,
-}
-
 /// Work done by the QP solver in all Newton steps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Counters {

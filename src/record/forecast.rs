@@ -1,4 +1,4 @@
-//! How long a run would take, by amounts of work.
+//! What a run would hold, and how long it would take, by amounts of work.
 
 use serde::{Deserialize, Serialize};
 
@@ -51,4 +51,15 @@ pub struct Forecast {
     pub seconds: f64,
     /// Of these for messages.
     pub messages: f64,
+}
+
+/// What a rank holds of an item.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct HeldRow {
+    /// Its name.
+    pub item: String,
+    /// The rank's share, in MiB.
+    pub owned_mb: f64,
+    /// What every rank holds, in MiB.
+    pub everywhere_mb: f64,
 }

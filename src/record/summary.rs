@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::counts::{CommunicationRow, ContactRow, Counted, Counters, HeldRow, Sizes, Work};
-use super::forecast::Forecast;
+use super::counts::{CommunicationRow, ContactRow, Counted, Counters, Sizes, Work};
+use super::forecast::{Forecast, HeldRow};
 use super::rows::{CascadeRow, NewtonRow, StepRow};
 use super::state::State;
 

@@ -5,7 +5,7 @@
 //! rows that are coupled ([`is_coupled`]), the factors of the coarse problem, and the lists of clusters.
 
 use super::memory::megabytes;
-use crate::record::counts::HeldRow;
+use crate::record::forecast::HeldRow;
 use crate::scene::{Contact, Scene};
 
 /// An item; all in bytes.

@@ -18,7 +18,7 @@
 
 use super::held::Item;
 use crate::material::Law;
-use crate::record::counts::HeldRow;
+use crate::record::forecast::HeldRow;
 use crate::scene::{Precision, Preconditioner, Scene};
 
 /// Memory of a run.
