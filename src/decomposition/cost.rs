@@ -32,9 +32,11 @@ const TOP: usize = 1500;
 /// the memory of many ranks.
 const SPARSE: usize = 50;
 
-/// Sizes of the groups of each level for so many subdomains of so many linear tetrahedra in all.
-pub fn groups(subdomains: usize, tetrahedra: u64) -> Vec<usize> {
-    let (size, most) = (cluster(subdomains, tetrahedra), (subdomains / SPARSE).clamp(FEW, TOP));
+/// Sizes of the groups of each level for so many subdomains of so many linear tetrahedra in all. In thin bodies several levels take
+/// up to twice the iterations, and are left to where one is too little.
+pub fn groups(subdomains: usize, tetrahedra: u64, is_thin: bool) -> Vec<usize> {
+    let most = if is_thin { TOP } else { (subdomains / SPARSE).clamp(FEW, TOP) };
+    let size = cluster(subdomains, tetrahedra);
     // On several levels blocks of two an edge take fewer iterations than larger or longer ones.
     let size = if size > 1 && subdomains.div_ceil(size) > most { 8 } else { size };
     to(most, subdomains, size)

@@ -72,7 +72,7 @@ pub fn discretise_expecting(
     let cut = cut(&scene.decomposition.method, &bodies);
     can_be_cut(scene, &bodies, cut)?;
     let tetrahedra = decomposition::tetrahedra(&bodies);
-    let groups = |count| groups(scene, count, tetrahedra);
+    let groups = |count| groups(scene, is_thin(&bodies, cut), count, tetrahedra);
     let decomposition = decomposition::tear(&torn, solids, cut, &groups, yielding, comm);
     let reading_mb = reading_mb(&bodies, comm);
 
@@ -190,10 +190,20 @@ pub fn cut(wanted: &scene::Method, bodies: &[BodyMesh]) -> Cut {
     }
 }
 
+/// Whether a body has few boxes across: groups of groups of such boxes are plates or bars, which are bound badly.
+pub fn is_thin(bodies: &[BodyMesh], cut: Cut) -> bool {
+    let Cut::Bricks(cells) = cut else { return false };
+    let across = |body: &BodyMesh| decomposition::bricks::along(body, cells).into_iter().min();
+    bodies.iter().filter_map(across).any(|boxes| boxes < ACROSS)
+}
+
+/// As many boxes make two groups of two.
+const ACROSS: usize = 4;
+
 /// Sizes of the groups of each level, for so many subdomains of so many linear tetrahedra.
-pub fn groups(scene: &Scene, subdomains: usize, tetrahedra: u64) -> Vec<usize> {
+pub fn groups(scene: &Scene, is_thin: bool, subdomains: usize, tetrahedra: u64) -> Vec<usize> {
     match &scene.decomposition.cluster {
-        None => cost::groups(subdomains, tetrahedra),
+        None => cost::groups(subdomains, tetrahedra, is_thin),
         Some(Groups::Equal(size)) => cost::levels(subdomains, *size),
         Some(Groups::Levels(sizes)) => sizes.clone(),
     }

@@ -2,13 +2,15 @@ use super::{cluster, groups, levels, subdomains};
 
 #[test]
 fn there_are_as_many_levels_as_the_coarse_problem_needs() {
-    let groups = |boxes: usize, cells: u64| groups(boxes, 6 * cells.pow(3) * boxes as u64);
+    let of = |boxes: usize, cells: u64, thin| groups(boxes, 6 * cells.pow(3) * boxes as u64, thin);
+    let groups = |boxes: usize, cells: u64| of(boxes, cells, false);
     assert!(groups(48, 10).is_empty());
     assert_eq!(groups(1296, 5), [8]);
     for boxes in [6000, 20_250, 93_750] {
         assert_eq!(groups(boxes, 2), [8, 8], "{boxes}");
     }
     assert_eq!(groups(1_000_000, 2), [8; 4]);
+    assert_eq!((of(6000, 2, true), of(93_750, 2, true)), (vec![8], vec![8, 8]));
     assert_eq!((levels(6000, 8), levels(93_750, 27), levels(10, 1)), (vec![8], vec![27; 2], vec![]));
 }
 

@@ -19,7 +19,7 @@ use super::held::is_coupled;
 use super::memory::{Held, Lengths, Memory, Numbers, megabytes};
 use crate::decomposition::{BodyMesh, Cut, bricks, tetrahedra};
 use crate::element::Kind;
-use crate::model::discrete::{can_be_cut, cut, groups};
+use crate::model::discrete::{can_be_cut, cut, groups, is_thin};
 use crate::model::meshes;
 use crate::model::meshes::MeshError;
 use crate::record::counts::Sizes;
@@ -162,7 +162,7 @@ impl<'a> Counted<'a> {
     fn parts(&self) -> Vec<Parts> {
         let all = self.tetrahedra();
         let bodies = || self.scene.body.keys().zip(&self.bodies).zip(&self.shapes);
-        let groups = |subdomains: usize| groups(self.scene, subdomains, all);
+        let groups = |subdomains: usize| groups(self.scene, is_thin(&self.bodies, self.cut), subdomains, all);
         match self.cut {
             Cut::Bricks(cells) => {
                 let count = self.bodies.iter().map(|body| bricks::count(body, cells)).fold(0, usize::saturating_add);
