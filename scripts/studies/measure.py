@@ -188,6 +188,9 @@ def shortened(summary, tables):
     if summary is None:
         return None
     found = {key: value for key, value in summary.items() if key in tables or not isinstance(value, (dict, list))}
+    # A scene's path is that of one machine.
+    if "scene" in found:
+        found["scene"] = pathlib.PurePath(found["scene"]).name
     if "steps" in found:
         found["steps"] = [{key: step[key] for key in ("time", "converged")} for step in found["steps"]]
     return found
