@@ -20,86 +20,80 @@ pub enum Rule {
 /// Directions that supports fix at each of some nodes. Collective.
 pub type HeldNodes<'a> = &'a dyn Fn(&[u64]) -> Vec<[bool; 3]>;
 
-/// Conditions of contact number `contact`. Collective.
-///
-/// # Errors
-/// If the surfaces do not face each other, or supports hold all slave nodes that do.
-pub fn pair(
-    comm: &dyn Comm,
-    contact: usize,
-    name: &str,
-    slave: &Patch,
-    master: &Patch,
-    held: HeldNodes,
-) -> Result<(Conditions, Rule), ContactError> {
-    match (matching(comm, contact, slave, master), [slave, master].map(|patch| patch.is_quadratic)) {
-        (Some(found), _) if found.count == 0 => Err(ContactError::Apart { name: name.to_owned() }),
-        (Some(found), [false, false] | [true, true]) => Ok((found, Rule::NodeToNode)),
-        _ => Ok((mortar(comm, contact, name, slave, master, held)?, Rule::Mortar)),
-    }
+/// What finds the conditions of one contact.
+#[derive(Clone, Copy)]
+pub struct Pairing<'a> {
+    /// The ranks.
+    pub comm: &'a dyn Comm,
+    /// Number of the contact.
+    pub contact: usize,
+    /// Its name.
+    pub name: &'a str,
+    /// What supports hold.
+    pub held: HeldNodes<'a>,
 }
 
-/// Conditions node by node; `None` if the surfaces do not match. Collective.
-fn matching(comm: &dyn Comm, contact: usize, slave: &Patch, master: &Patch) -> Option<Conditions> {
-    let [one, other] = [slave, master].map(|patch| &patch.surface);
-    let opposite = master.near(comm, &matching::lines(one, other.spacing()));
-    let back = slave.near(comm, &matching::lines(other, one.spacing()));
-    let (facing, backwards) = (matching::facing(one, &opposite), matching::facing(other, &back));
-    let differs = facing.is_none() || backwards.is_none();
-    if sums(comm, [u64::from(differs)]) != [0] {
-        return None;
+impl Pairing<'_> {
+    /// Conditions of the slave's nodes. Collective.
+    ///
+    /// # Errors
+    /// If the surfaces do not face each other, or supports hold all slave nodes that do.
+    pub fn pair(&self, slave: &Patch, master: &Patch) -> Result<(Conditions, Rule), ContactError> {
+        match (self.matching(slave, master), [slave, master].map(|patch| patch.is_quadratic)) {
+            (Some(found), _) if found.count == 0 => Err(ContactError::Apart { name: self.name.to_owned() }),
+            (Some(found), [false, false] | [true, true]) => Ok((found, Rule::NodeToNode)),
+            _ => Ok((self.mortar(slave, master)?, Rule::Mortar)),
+        }
     }
-    let mut found = matching::conditions(contact, one, &opposite, facing?);
-    if slave.is_quadratic && master.is_quadratic {
-        let gap = |pair: &ContactPair, along| quadratic::distance(one, &opposite, pair, along);
-        let count = found.pairs.len();
-        found.pairs = quadratic::conditions(one, found.pairs, gap);
-        assert_eq!(found.pairs.len(), count, "covered faces have all their corners");
-    }
-    [found.count] = sums(comm, [found.masters.len() as u64]).map(|count| count as usize);
-    Some(found)
-}
 
-/// Conditions against means. Collective.
-fn mortar(
-    comm: &dyn Comm,
-    contact: usize,
-    name: &str,
-    slave: &Patch,
-    master: &Patch,
-    held: HeldNodes,
-) -> Result<Conditions, ContactError> {
-    let one = &slave.surface;
-    let opposite = master.near(comm, &mortar::lines(one));
-    let (found, is_opposite) = mortar::conditions(contact, one, &opposite, &held(&one.nodes));
-    let all = sums(comm, [found.count as u64, found.held as u64, u64::from(is_opposite)]);
-    let [count, held, opposite] = all.map(|n| n as usize);
-    mortar::accept(name, Conditions { count, held, ..found }, opposite > 0)
-}
-
-/// As [`pair`], but chooses the slave: its index comes first. Collective.
-///
-/// # Errors
-/// As there, for either surface as the slave.
-pub fn choose(
-    comm: &dyn Comm,
-    contact: usize,
-    name: &str,
-    surfaces: [&Patch; 2],
-    held: HeldNodes,
-) -> Result<(usize, Conditions, Rule), ContactError> {
-    let [one, other] = surfaces;
-    let first = pair(comm, contact, name, one, other, held);
-    if let Ok((found, Rule::NodeToNode)) = first {
-        return Ok((0, found, Rule::NodeToNode));
+    /// As [`Pairing::pair`], but chooses the slave: its index comes first. Collective.
+    ///
+    /// # Errors
+    /// As there, for either surface as the slave.
+    pub fn choose(&self, [one, other]: [&Patch; 2]) -> Result<(usize, Conditions, Rule), ContactError> {
+        let first = self.pair(one, other);
+        if let Ok((found, Rule::NodeToNode)) = first {
+            return Ok((0, found, Rule::NodeToNode));
+        }
+        let second = self.pair(other, one);
+        let rank = |(found, _): &(Conditions, Rule)| (found.held > 0, usize::MAX - found.count);
+        match (first, second) {
+            (Ok(first), Ok(second)) if rank(&second) < rank(&first) => Ok((1, second.0, second.1)),
+            (Err(_), Ok((found, rule))) => Ok((1, found, rule)),
+            (Ok((found, rule)), _) => Ok((0, found, rule)),
+            (Err(error), Err(_)) => Err(error),
+        }
     }
-    let second = pair(comm, contact, name, other, one, held);
-    let rank = |(found, _): &(Conditions, Rule)| (found.held > 0, usize::MAX - found.count);
-    match (first, second) {
-        (Ok(first), Ok(second)) if rank(&second) < rank(&first) => Ok((1, second.0, second.1)),
-        (Err(_), Ok((found, rule))) => Ok((1, found, rule)),
-        (Ok((found, rule)), _) => Ok((0, found, rule)),
-        (Err(error), Err(_)) => Err(error),
+
+    /// Conditions node by node; `None` if the surfaces do not match. Collective.
+    fn matching(&self, slave: &Patch, master: &Patch) -> Option<Conditions> {
+        let [one, other] = [slave, master].map(|patch| &patch.surface);
+        let opposite = master.near(self.comm, &matching::lines(one, other.spacing()));
+        let back = slave.near(self.comm, &matching::lines(other, one.spacing()));
+        let (facing, backwards) = (matching::facing(one, &opposite), matching::facing(other, &back));
+        let differs = facing.is_none() || backwards.is_none();
+        if sums(self.comm, [u64::from(differs)]) != [0] {
+            return None;
+        }
+        let mut found = matching::conditions(self.contact, one, &opposite, facing?);
+        if slave.is_quadratic && master.is_quadratic {
+            let gap = |pair: &ContactPair, along| quadratic::distance(one, &opposite, pair, along);
+            let count = found.pairs.len();
+            found.pairs = quadratic::conditions(one, found.pairs, gap);
+            assert_eq!(found.pairs.len(), count, "covered faces have all their corners");
+        }
+        [found.count] = sums(self.comm, [found.masters.len() as u64]).map(|count| count as usize);
+        Some(found)
+    }
+
+    /// Conditions against means. Collective.
+    fn mortar(&self, slave: &Patch, master: &Patch) -> Result<Conditions, ContactError> {
+        let one = &slave.surface;
+        let opposite = master.near(self.comm, &mortar::lines(one));
+        let (found, is_opposite) = mortar::conditions(self.contact, one, &opposite, &(self.held)(&one.nodes));
+        let all = sums(self.comm, [found.count as u64, found.held as u64, u64::from(is_opposite)]);
+        let [count, held, opposite] = all.map(|n| n as usize);
+        mortar::accept(self.name, Conditions { count, held, ..found }, opposite > 0)
     }
 }
 
@@ -122,7 +116,8 @@ mod tests {
             nodes.iter().map(|n| [false, false, all || all_held.contains(n)]).collect()
         };
         let [one, other] = [one, other].map(|surface| Patch::alone(surface.clone()));
-        let found = choose(&Solo, 0, "joint", [&one, &other], &held);
+        let pairing = Pairing { comm: &Solo, contact: 0, name: "joint", held: &held };
+        let found = pairing.choose([&one, &other]);
         found.ok().map(|(slave, found, rule)| (slave, found.pairs.len(), rule))
     }
 
@@ -146,8 +141,9 @@ mod tests {
     fn another_order_of_the_two_is_the_same_contact() {
         let [fine, coarse] = squares(5, 3).map(Patch::alone);
         let free = |nodes: &[u64]| vec![[false; 3]; nodes.len()];
-        let (slave, found, _) = choose(&Solo, 0, "joint", [&fine, &coarse], &free).expect("they face each other");
-        let (turned, same, _) = choose(&Solo, 0, "joint", [&coarse, &fine], &free).expect("they face each other");
+        let pairing = Pairing { comm: &Solo, contact: 0, name: "joint", held: &free };
+        let (slave, found, _) = pairing.choose([&fine, &coarse]).expect("they face each other");
+        let (turned, same, _) = pairing.choose([&coarse, &fine]).expect("they face each other");
         assert_eq!((slave, turned), (0, 1));
         assert_eq!(found, same);
     }

@@ -6,7 +6,7 @@ use super::extent::{self, Extent};
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::{Support, dirichlet};
 use crate::contact::known::{Found, Pairs, spread};
-use crate::contact::pairing::{self, Rule};
+use crate::contact::pairing::{Pairing, Rule};
 use crate::contact::patch::Patch;
 use crate::contact::{ContactError, ContactPair, MasterNode, corner, rigid, sagitta};
 use crate::decomposition::Decomposition;
@@ -84,6 +84,7 @@ fn one(
     index: impl Fn(&SurfaceName) -> usize,
 ) -> Result<(Found, ContactRow, Vec<String>), ContactError> {
     let held = |nodes: &[u64]| dirichlet::fixed_at(comm, &decomposition.interface, supports, nodes);
+    let pairing = Pairing { comm, contact: number, name, held: &held };
     let patch = |s| (s, Patch::new(comm, decomposition, index(s)));
     let surfaces: Vec<(&SurfaceName, Patch)> = contact.surfaces().map(patch).collect();
     let (slave, mut conditions, rule) = match (&contact.sides, &surfaces[..]) {
@@ -91,11 +92,11 @@ fn one(
             (0, rigid::pair(comm, number, name, &slave.surface, obstacle)?, "rigid")
         }
         (Sides::Named { .. }, [(_, slave), (_, master)]) => {
-            let (found, rule) = pairing::pair(comm, number, name, slave, master, &held)?;
+            let (found, rule) = pairing.pair(slave, master)?;
             (0, found, rule_name(rule))
         }
         (Sides::Either(_), [(_, one), (_, other)]) => {
-            let (slave, found, rule) = pairing::choose(comm, number, name, [one, other], &held)?;
+            let (slave, found, rule) = pairing.choose([one, other])?;
             (slave, found, rule_name(rule))
         }
         _ => unreachable!("two sides have two surfaces"),
