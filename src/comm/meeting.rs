@@ -59,6 +59,25 @@ pub fn look_up<const N: usize>(
     found
 }
 
+/// A word for each question, from the rank that it is for: there `hear` is given the questions of all ranks, by rank, and returns what
+/// answers each. Collective.
+pub fn ask<const N: usize, A: Fn(&[u64; N]) -> u64>(
+    comm: &dyn Comm,
+    questions: &[[u64; N]],
+    whom: impl Fn(&[u64; N]) -> usize,
+    hear: impl FnOnce(&[&[[u64; N]]]) -> A,
+) -> Vec<u64> {
+    let mut outgoing = vec![Vec::new(); comm.size()];
+    questions.iter().for_each(|question| outgoing[whom(question)].extend(question));
+    let incoming = comm.all_to_all(outgoing);
+    let incoming: Vec<&[[u64; N]]> = incoming.iter().map(|message| message.as_chunks().0).collect();
+    let answer = hear(&incoming);
+    let answers = incoming.iter().map(|theirs| theirs.iter().map(&answer).collect()).collect();
+    let mut answers: Vec<_> = comm.all_to_all(answers).into_iter().map(Vec::into_iter).collect();
+    let next = |question| answers[whom(question)].next().expect("every question is answered");
+    questions.iter().map(next).collect()
+}
+
 /// How often all ranks together name each of this rank's keys. Collective.
 pub fn count<const N: usize>(comm: &dyn Comm, mine: &[[u64; N]]) -> HashMap<[u64; N], u64> {
     let ranks = comm.size();

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::components::Components;
 use super::contact;
 use super::ties::Ties;
-use crate::comm::meeting::home;
+use crate::comm::meeting::{ask, home};
 use crate::comm::{Comm, maximum, sums};
 use crate::contact::ContactPair;
 use crate::contact::known::Pairs;
@@ -128,36 +128,34 @@ pub(super) fn components(pairs: &Pairs, ties: &Ties) -> BTreeMap<u64, BTreeSet<u
 fn names(comm: &dyn Comm, pairs: &Pairs, ties: &Ties) -> HashMap<u64, u64> {
     let ranks = comm.size();
     let (mut names, nodes): (Vec<u64>, Vec<BTreeSet<u64>>) = components(pairs, ties).into_iter().unzip();
-    // Nodes by their homes, with the component that they are in here.
-    let mut at: Vec<Vec<(u64, usize)>> = vec![Vec::new(); ranks];
-    for (number, nodes) in nodes.iter().enumerate() {
-        nodes.iter().for_each(|&node| at[home(&[node], ranks)].push((node, number)));
-    }
+    // Nodes with the component that they are in here.
+    let at: Vec<(u64, usize)> =
+        nodes.iter().enumerate().flat_map(|(number, nodes)| nodes.iter().map(move |&node| (node, number))).collect();
     let mut of_node: HashMap<u64, u64> = HashMap::new();
     loop {
-        let told = at.iter().map(|at| at.iter().flat_map(|&(node, number)| [node, names[number]]).collect());
-        let reports = comm.all_to_all(told.collect());
-        for &[node, name] in reports.iter().flat_map(|report| report.as_chunks::<2>().0) {
-            let lowest = of_node.entry(node).or_insert(name);
-            *lowest = name.min(*lowest);
-        }
-        let answer = |report: &Vec<u64>| report.as_chunks::<2>().0.iter().map(|[node, _]| of_node[node]).collect();
-        let answers = comm.all_to_all(reports.iter().map(answer).collect());
+        let told: Vec<[u64; 2]> = at.iter().map(|&(node, number)| [node, names[number]]).collect();
+        let known = &mut of_node;
+        let answers = ask(
+            comm,
+            &told,
+            |[node, _]| home(&[*node], ranks),
+            |reports| {
+                for &[node, name] in reports.iter().copied().flatten() {
+                    let lowest = known.entry(node).or_insert(name);
+                    *lowest = name.min(*lowest);
+                }
+                move |[node, _]| known[node]
+            },
+        );
         let mut lower = names.clone();
-        for ((_, number), name) in at.iter().flatten().zip(answers.into_iter().flatten()) {
+        for ((_, number), name) in at.iter().zip(answers) {
             lower[*number] = name.min(lower[*number]);
         }
         // The names of names.
-        let mut wanted: Vec<Vec<(u64, usize)>> = vec![Vec::new(); ranks];
-        for (number, &name) in lower.iter().enumerate() {
-            wanted[home(&[name], ranks)].push((name, number));
-        }
-        let asked = comm.all_to_all(wanted.iter().map(|at| at.iter().map(|(name, _)| *name).collect()).collect());
-        let answer = |names: Vec<u64>| names.iter().map(|name| of_node.get(name).map_or(*name, |of| *of)).collect();
-        let answers = comm.all_to_all(asked.into_iter().map(answer).collect());
-        for ((_, number), name) in wanted.iter().flatten().zip(answers.into_iter().flatten()) {
-            lower[*number] = name.min(lower[*number]);
-        }
+        let wanted: Vec<[u64; 1]> = lower.iter().map(|&name| [name]).collect();
+        let of = |[name]: &[u64; 1]| of_node.get(name).map_or(*name, |of| *of);
+        let answers = ask(comm, &wanted, |name| home(name, ranks), |_| of);
+        lower.iter_mut().zip(answers).for_each(|(lower, name)| *lower = name.min(*lower));
         let changed = lower != names;
         names = lower;
         if sums(comm, [u64::from(changed)]) == [0] {

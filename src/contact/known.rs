@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Index;
 
 use super::{Conditions, ContactPair, MasterNode, Site};
-use crate::comm::meeting::{home, look_up};
+use crate::comm::meeting::{ask, home, look_up};
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::{Decomposition, InterfaceNode};
 
@@ -151,33 +151,29 @@ pub fn spread(
 /// Collective.
 fn numbers(comm: &dyn Comm, nodes: u64, contacts: usize, keys: &[[u64; 3]]) -> (HashMap<[u64; 3], usize>, usize) {
     let ranks = comm.size();
-    let mut asked: Vec<Vec<[u64; 3]>> = vec![Vec::new(); ranks];
-    for key in keys {
-        asked[(u128::from(key[1]) * ranks as u128 / u128::from(nodes.max(1))) as usize].push(*key);
-    }
-    let incoming = comm.all_to_all(asked.iter().map(|keys| keys.as_flattened().to_vec()).collect());
-    let here: BTreeSet<[u64; 3]> = incoming.iter().flat_map(|keys| keys.as_chunks::<3>().0).copied().collect();
-    let mut counts = vec![0_u64; contacts];
-    here.iter().for_each(|key| counts[key[0] as usize] += 1);
-    let all = all_gather_u64(comm, &counts);
-    let of = |rank: usize, contact: usize| all[rank * contacts + contact] as usize;
-    let first = |contact: usize| -> usize {
-        let before = (0..contact).flat_map(|c| (0..ranks).map(move |rank| (rank, c)));
-        before.chain((0..comm.rank()).map(|rank| (rank, contact))).map(|(rank, c)| of(rank, c)).sum()
-    };
-    let mut next: Vec<usize> = (0..contacts).map(first).collect();
-    let number: HashMap<[u64; 3], u64> = here
-        .into_iter()
-        .map(|key| {
+    let whom = |key: &[u64; 3]| (u128::from(key[1]) * ranks as u128 / u128::from(nodes.max(1))) as usize;
+    let mut total = 0;
+    let found = ask(comm, keys, whom, |incoming| {
+        let here: BTreeSet<[u64; 3]> = incoming.iter().copied().flatten().copied().collect();
+        let mut counts = vec![0_u64; contacts];
+        here.iter().for_each(|key| counts[key[0] as usize] += 1);
+        let all = all_gather_u64(comm, &counts);
+        total = all.iter().sum::<u64>() as usize;
+        let of = |rank: usize, contact: usize| all[rank * contacts + contact];
+        let first = |contact: usize| -> u64 {
+            let before = (0..contact).flat_map(|c| (0..ranks).map(move |rank| (rank, c)));
+            before.chain((0..comm.rank()).map(|rank| (rank, contact))).map(|(rank, c)| of(rank, c)).sum()
+        };
+        let mut next: Vec<u64> = (0..contacts).map(first).collect();
+        let mut number = |key: [u64; 3]| {
             let next = &mut next[key[0] as usize];
             *next += 1;
-            (key, *next as u64 - 1)
-        })
-        .collect();
-    let answer = |keys: Vec<u64>| keys.as_chunks::<3>().0.iter().map(|key| number[key]).collect();
-    let answers = comm.all_to_all(incoming.into_iter().map(answer).collect());
-    let found = asked.into_iter().flatten().zip(answers.into_iter().flatten());
-    (found.map(|(key, number)| (key, number as usize)).collect(), all.iter().sum::<u64>() as usize)
+            (key, *next - 1)
+        };
+        let numbers: HashMap<[u64; 3], u64> = here.into_iter().map(&mut number).collect();
+        move |key| numbers[key]
+    });
+    (keys.iter().copied().zip(found.into_iter().map(|number| number as usize)).collect(), total)
 }
 
 /// Of what ranks say of a master node the nearest surface counts, of the same distance that of the lowest rank, whose faces come

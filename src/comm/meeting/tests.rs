@@ -39,3 +39,25 @@ fn keys_with_a_stride_are_spread_over_the_ranks() {
         assert!(loads.iter().all(|load| (40..200).contains(load)), "{stride}: {loads:?}");
     }
 }
+
+#[test]
+fn questions_are_answered_in_their_order_by_those_who_have_heard_all() {
+    for ranks in [1, 2, 5] {
+        let found = threads::run(ranks, |comm| {
+            let mine: Vec<[u64; 2]> = (0..9).map(|k| [7 * k % 9, comm.rank() as u64]).collect();
+            let whom = |question: &[u64; 2]| question[0] as usize % ranks;
+            ask(comm, &mine, whom, |all| {
+                let sum: u64 = all.iter().copied().flatten().map(|question| question[1]).sum();
+                move |[key, rank]| 10_000 * sum + 100 * key + rank
+            })
+        });
+        for (rank, answers) in found.into_iter().enumerate() {
+            for (k, answer) in answers.into_iter().enumerate() {
+                let key = 7 * k % 9;
+                let here = (0..9).filter(|other| other % ranks == key % ranks).count();
+                let sum = here * ranks * (ranks - 1) / 2;
+                assert_eq!(answer as usize, 10_000 * sum + 100 * key + rank);
+            }
+        }
+    }
+}

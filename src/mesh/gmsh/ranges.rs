@@ -16,6 +16,7 @@ use super::source::Source;
 use super::{Block, Msh, version4};
 use crate::comm::Comm;
 use crate::comm::agree::agree;
+use crate::comm::meeting::ask;
 use crate::comm::words::{least, share};
 
 /// Bytes of a number.
@@ -226,18 +227,14 @@ fn indices(comm: &dyn Comm, (first, tags): (u64, Vec<u64>), wanted: &[u64]) -> R
     if let Some([tag]) = least(comm, twice) {
         return Err(Problem::NodeTwice(tag));
     }
-    let mut asked = wanted.to_vec();
+    let mut asked: Vec<[u64; 1]> = wanted.iter().map(|&tag| [tag]).collect();
     asked.sort_unstable();
     asked.dedup();
-    let mut outgoing = vec![Vec::new(); comm.size()];
-    asked.iter().for_each(|&tag| outgoing[meeting(tag)].push(tag));
-    let place =
-        |tag: &u64| known.binary_search_by_key(tag, |entry| entry[0]).map_or(u64::from(u32::MAX), |at| known[at][1]);
-    let answers = comm.all_to_all(outgoing).iter().map(|theirs| theirs.iter().map(place).collect()).collect();
-    let mut answers: Vec<_> = comm.all_to_all(answers).into_iter().map(Vec::into_iter).collect();
-    let answer = |&tag: &u64| answers[meeting(tag)].next().expect("every question is answered") as u32;
-    let places: Vec<u32> = asked.iter().map(answer).collect();
-    Ok(wanted.iter().map(|tag| places[asked.binary_search(tag).expect("it was asked for")]).collect())
+    let place = |[tag]: &[u64; 1]| {
+        known.binary_search_by_key(tag, |entry| entry[0]).map_or(u64::from(u32::MAX), |at| known[at][1])
+    };
+    let places = ask(comm, &asked, |[tag]| meeting(*tag), |_| place);
+    Ok(wanted.iter().map(|&tag| places[asked.binary_search(&[tag]).expect("it was asked for")] as u32).collect())
 }
 
 #[cfg(test)]

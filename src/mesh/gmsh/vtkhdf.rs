@@ -17,6 +17,7 @@ use super::error::Problem;
 use super::kind::Kind;
 use super::{Block, Msh};
 use crate::comm::agree::agree;
+use crate::comm::meeting::{ask, home};
 use crate::comm::words::{holder, share, sum};
 use crate::comm::{Comm, all_gather_u64};
 
@@ -81,9 +82,10 @@ pub(super) fn read(comm: &dyn Comm, path: &Path) -> Result<Msh, Problem> {
     let first = share(nodes, comm).start;
     if let Some(ids) = ids {
         let one = canonical(comm, first, &ids);
-        let asked: Vec<u64> = cells.iter().flat_map(|cell| &cell.nodes).copied().collect();
-        let mut places = answers(comm, nodes, &asked, |node| one[(node - first) as usize]).into_iter();
-        cells.iter_mut().flat_map(|cell| &mut cell.nodes).zip(&mut places).for_each(|(node, place)| *node = place);
+        let asked: Vec<[u64; 1]> = cells.iter().flat_map(|cell| &cell.nodes).map(|&node| [node]).collect();
+        let of = |[node]: &[u64; 1]| one[(node - first) as usize];
+        let places = ask(comm, &asked, |[node]| holder(*node, nodes, comm), |_| of);
+        cells.iter_mut().flat_map(|cell| &mut cell.nodes).zip(places).for_each(|(node, place)| *node = place);
     }
     Ok(dealt(comm, Msh { nodes, points, ..Msh::default() }, &cells))
 }
@@ -203,26 +205,17 @@ fn rows<T: H5Type + Clone>(root: &Group, name: &str, rows: &Range<u64>, width: u
 
 /// For each of this rank's points the first of all points with the same number. Collective.
 fn canonical(comm: &dyn Comm, first: u64, ids: &[i64]) -> Vec<u64> {
-    let meeting = |id: i64| id.unsigned_abs() % comm.size() as u64;
-    let mut outgoing = vec![Vec::new(); comm.size()];
-    let places = first..;
-    places.zip(ids).for_each(|(place, id)| outgoing[meeting(*id) as usize].extend([id.cast_unsigned(), place]));
-    let incoming = comm.all_to_all(outgoing);
-    let mut known: Vec<[u64; 2]> = incoming.iter().flat_map(|theirs| theirs.as_chunks().0).copied().collect();
-    known.sort_unstable();
-    let one = |&[id, _]: &[u64; 2]| known[known.partition_point(|entry| entry[0] < id)][1];
-    let found = incoming.iter().map(|theirs| theirs.as_chunks().0.iter().map(one).collect()).collect();
-    let mut answers: Vec<_> = comm.all_to_all(found).into_iter().map(Vec::into_iter).collect();
-    ids.iter().map(|id| answers[meeting(*id) as usize].next().expect("every point is answered")).collect()
-}
-
-/// What the ranks that have some points say of them. Collective.
-fn answers(comm: &dyn Comm, nodes: u64, asked: &[u64], of: impl Fn(u64) -> u64) -> Vec<u64> {
-    let mut outgoing = vec![Vec::new(); comm.size()];
-    asked.iter().for_each(|&node| outgoing[holder(node, nodes, comm)].push(node));
-    let found = comm.all_to_all(outgoing).iter().map(|theirs| theirs.iter().map(|&node| of(node)).collect()).collect();
-    let mut answers: Vec<_> = comm.all_to_all(found).into_iter().map(Vec::into_iter).collect();
-    asked.iter().map(|&node| answers[holder(node, nodes, comm)].next().expect("every point is answered")).collect()
+    let mine: Vec<[u64; 2]> = ids.iter().map(|id| id.cast_unsigned()).zip(first..).map(|(id, at)| [id, at]).collect();
+    ask(
+        comm,
+        &mine,
+        |[id, _]| home(&[*id], comm.size()),
+        |all| {
+            let mut known: Vec<[u64; 2]> = all.iter().copied().flatten().copied().collect();
+            known.sort_unstable();
+            move |[id, _]| known[known.partition_point(|entry| entry[0] < *id)][1]
+        },
+    )
 }
 
 /// Cells by kind and group, and of these this rank's share. Collective.
