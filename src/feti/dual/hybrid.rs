@@ -42,7 +42,7 @@ pub struct Hybrid<'a> {
     gather: &'a Gather<'a>,
     subdomains: &'a [Subdomain],
     /// Modes of own subdomains, in terms of their shapes.
-    modes: Vec<RigidModes>,
+    modes: &'a [RigidModes],
     /// `c` of the last solve, in all rows.
     forces: Vec<f64>,
     jumps: Vec<f64>,
@@ -61,19 +61,18 @@ impl<'a> Hybrid<'a> {
         let is_plain = decomposition.clusters.are_single();
         let balance = (!is_plain).then(|| Balance::new(connection, decomposition, constraints)).transpose();
         let balance = balance.map_err(|subdomain| Loose { subdomain })?;
-        Ok(balance.map(|balance| Self::new(balance, &connection.gather, &decomposition.subdomains)))
+        Ok(balance.map(|balance| Self::new(balance, connection, &decomposition.subdomains)))
     }
 
-    fn new(balance: Balance<'a>, gather: &'a Gather<'a>, subdomains: &'a [Subdomain]) -> Self {
-        let modes = subdomains.iter().map(|s| RigidModes::new(&s.shape)).collect();
-        let rows = gather.rows();
+    fn new(balance: Balance<'a>, connection: &'a Interconnection<'a>, subdomains: &'a [Subdomain]) -> Self {
+        let (gather, modes, rows) = (&connection.gather, &connection.motions.shapes[..], connection.gather.rows());
         Self { balance, gather, subdomains, modes, forces: vec![0.0; rows], jumps: vec![0.0; rows] }
     }
 
     /// `x = K~^+ x`. Two neighbour exchanges and two messages up and down the tree for each level. Collective.
     pub fn solve(&mut self, inverse: &mut Inverse, x: &mut Torn) {
         let resultants = |((s, modes), x): ((&Subdomain, &RigidModes), &Vec<f64>)| modes.resultants(&s.shape, x);
-        let resultants = self.subdomains.iter().zip(&self.modes).zip(&*x).flat_map(resultants).collect();
+        let resultants = self.subdomains.iter().zip(self.modes).zip(&*x).flat_map(resultants).collect();
         self.balance.forces(resultants, &mut self.forces);
         self.gather.add_transpose(-1.0, &self.forces, x);
         inverse.solve(x);
@@ -90,7 +89,7 @@ impl<'a> Hybrid<'a> {
     fn bring_together(&mut self, u: &mut Torn) {
         self.gather.apply(u, &mut self.jumps);
         let motions = self.balance.motions(&mut self.jumps);
-        let of_members = motions.as_chunks().0.iter().zip(self.subdomains).zip(&self.modes).zip(u);
+        let of_members = motions.as_chunks().0.iter().zip(self.subdomains).zip(self.modes).zip(u);
         for (((amplitudes, subdomain), modes), u) in of_members {
             let back: [f64; 6] = amplitudes.map(|a: f64| -a);
             modes.add_motion(&subdomain.shape, &back, u);

@@ -13,10 +13,10 @@ use std::rc::Rc;
 
 use faer::{Mat, Side};
 
-use super::gluing::Gluing;
+use super::gluing::{self, Gluing};
 use super::halo::Halo;
 use super::motions::Transfer;
-use super::stiffness::{self, Inverse, TOGETHER};
+use super::stiffness::{Equalities, Inverse, OfLevel, TOGETHER};
 use super::{Motions, Tree};
 use crate::constraint::Constraints;
 use crate::decomposition::Decomposition;
@@ -29,7 +29,7 @@ pub struct Balance<'a> {
     tree: &'a Tree<'a>,
     motions: &'a Motions,
     halo: &'a Halo<'a>,
-    gluing: Gluing,
+    gluing: Gluing<'a>,
     levels: Vec<Level>,
     /// For each level, from 0, the inverses of the diagonal blocks of `G G'` of its groups that are at home here.
     diagonals: Vec<Vec<Transfer>>,
@@ -53,20 +53,22 @@ impl<'a> Balance<'a> {
         constraints: &Constraints,
     ) -> Result<Self, usize> {
         let Decomposition { clusters, subdomains, .. } = decomposition;
-        let Interconnection { gather, space, halo, tree, motions } = connection;
-        let gluing = Gluing::new(clusters, subdomains, constraints, gather, halo);
-        let mut levels = Vec::new();
+        let Interconnection { space, halo, tree, motions, .. } = connection;
+        let of_rows: Vec<_> =
+            (0..constraints.rows.len()).map(|row| gluing::level(clusters, constraints, row)).collect();
+        let gluing = Gluing::new((connection, subdomains), constraints, &of_rows);
+        let equalities = Equalities { clusters, connection, subdomains, constraints, of_rows: &of_rows };
+        let (mut levels, mut diagonals) = (Vec::new(), Vec::new());
         for level in 1..=clusters.levels() {
-            let inverses = stiffness::inverses(level, (clusters, tree, motions), subdomains, constraints, gather);
+            let OfLevel { inverses, diagonals: of_members } = equalities.of_level(level);
             let loose = inverses
                 .iter()
                 .position(Option::is_none)
                 .map(|at| clusters.begin(level, tree.groups(level).start + at));
             space.lowest(loose).map_or(Ok(()), Err)?;
             levels.push(Level::new(inverses.into_iter().flatten().collect()));
+            diagonals.push(of_members.iter().map(inverse).collect());
         }
-        let diagonal = |level| stiffness::diagonal(level, (clusters, tree, motions), subdomains, constraints, gather);
-        let diagonals = (0..clusters.levels()).map(|level| diagonal(level).iter().map(inverse).collect()).collect();
         Ok(Self { tree, motions, halo, gluing, levels, diagonals })
     }
 

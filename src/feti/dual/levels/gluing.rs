@@ -8,16 +8,16 @@ use std::ops::RangeInclusive;
 use super::halo::Halo;
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::{Clusters, Subdomain};
-use crate::feti::dual::gather::Gather;
+use crate::feti::dual::Interconnection;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
 use crate::work;
 
 /// `G` of one rank's equalities.
-pub struct Gluing {
+pub struct Gluing<'a> {
     /// For each level the rows of each component of the displacement.
     levels: Vec<[Rows; 3]>,
-    /// Modes of own subdomains.
-    modes: Vec<RigidModes>,
+    /// Modes of own subdomains, in terms of their shapes.
+    modes: &'a [RigidModes],
 }
 
 /// Rows that compare one component of copies.
@@ -32,23 +32,22 @@ struct Rows {
     lever: Vec<[f64; 3]>,
 }
 
-impl Gluing {
-    /// Of the rows of this rank. One neighbour exchange.
+impl<'a> Gluing<'a> {
+    /// Of the rows of this rank, given the level of each. One neighbour exchange.
     pub fn new(
-        clusters: &Clusters,
-        subdomains: &[Subdomain],
+        (connection, subdomains): (&'a Interconnection, &[Subdomain]),
         constraints: &Constraints,
-        gather: &Gather,
-        halo: &Halo,
+        of_rows: &[Option<usize>],
     ) -> Self {
+        let Interconnection { gather, halo, tree, motions, .. } = connection;
         let none = || [(); 3].map(|()| Rows { begin: vec![0], ..Rows::default() });
-        let mut levels: Vec<[Rows; 3]> = (0..=clusters.levels()).map(|_| none()).collect();
-        let modes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.shape)).collect();
+        let mut levels: Vec<[Rows; 3]> = (0..=tree.levels()).map(|_| none()).collect();
+        let modes = &motions.shapes[..];
         let plain: Vec<RigidModes> = modes.iter().map(RigidModes::plain).collect();
         gather.moved(
             |own, node| plain[own].at(subdomains[own].shape[node]),
             |row, values| {
-                let Some(level) = level(clusters, constraints, row) else { return };
+                let Some(level) = of_rows[row] else { return };
                 let axis = constraints.rows[row].terms[0].axis;
                 let of = &mut levels[level - 1][axis];
                 of.rows.push(row as u32);
@@ -77,14 +76,14 @@ impl Gluing {
                 }
             }
         }
-        for ((sum, modes), force) in sums.as_chunks_mut::<MODES>().0.iter_mut().zip(&self.modes).zip(forces) {
+        for ((sum, modes), force) in sums.as_chunks_mut::<MODES>().0.iter_mut().zip(self.modes).zip(forces) {
             sum.iter_mut().zip(modes.of_force(force)).for_each(|(sum, x)| *sum += x);
         }
     }
 
     /// `rows += factor G'a` in the rows of some levels, of six numbers an own subdomain. One neighbour exchange.
     pub fn add_moved(&self, halo: &Halo, levels: RangeInclusive<usize>, factor: f64, a: &[f64], rows: &mut [f64]) {
-        let motions = a.as_chunks::<MODES>().0.iter().zip(&self.modes);
+        let motions = a.as_chunks::<MODES>().0.iter().zip(self.modes);
         let mut motions: Vec<f64> = motions.flat_map(|(a, modes)| modes.to_motion(*a)).collect();
         halo.fill(&mut motions, MODES);
         let motions = motions.as_chunks::<MODES>().0;

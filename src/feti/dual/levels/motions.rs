@@ -10,6 +10,8 @@ pub type Transfer = [[f64; MODES]; MODES];
 
 /// The modes of own subdomains and of their groups.
 pub struct Motions {
+    /// Those of own subdomains in terms of their shapes, if there are groups: congruent ones have equal bits.
+    pub shapes: Vec<RigidModes>,
     /// For each level, from 0, those of each own subdomain's group.
     pub levels: Vec<Vec<RigidModes>>,
     /// For each level, from 1, `T_c` of all children of the groups at home here: the group's modes in terms of the child's.
@@ -40,7 +42,9 @@ impl Motions {
             let spread = tree.spread(level, &modes, NUMBERS);
             levels.push(spread.as_chunks().0.iter().map(RigidModes::from_numbers).collect());
         }
-        Self { levels, transfers }
+        let of_shape = |s: &Subdomain| RigidModes::new(&s.shape);
+        let shapes = if tree.levels() > 0 { subdomains.iter().map(of_shape).collect() } else { Vec::new() };
+        Self { shapes, levels, transfers }
     }
 }
 

@@ -9,18 +9,20 @@ use std::rc::Rc;
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 
-use super::{Motions, Tree, gluing};
+use super::Motions;
+use super::motions::Transfer;
 use crate::constraint::Constraints;
 use crate::decomposition::{Clusters, Subdomain};
-use crate::feti::dual::gather::Gather;
-use crate::feti::inverse::kernel::{MODES, RigidModes};
+use crate::feti::dual::Interconnection;
+use crate::feti::inverse::kernel::MODES;
 use crate::simd::vectorised;
 use crate::work;
 
 /// `G` of a row, by members.
 type OfRow = Vec<(u32, [f64; MODES])>;
+type Block = [f64; MODES * MODES];
 /// Blocks between two members.
-type Blocks = BTreeMap<(u32, u32), [f64; MODES * MODES]>;
+type Blocks = BTreeMap<(u32, u32), Block>;
 
 /// `(G G')^+` of all members but the first, by columns.
 pub struct Inverse {
@@ -29,87 +31,128 @@ pub struct Inverse {
     columns: Vec<f64>,
 }
 
-/// The inverses of the groups of one level that are at home here; groups with equal blocks share one. `None` for a group whose
-/// members something leaves free. Collective.
-pub fn inverses(
-    level: usize,
-    (clusters, tree, motions): (&Clusters, &Tree, &Motions),
-    subdomains: &[Subdomain],
-    constraints: &Constraints,
-    gather: &Gather,
-) -> Vec<Option<Rc<Inverse>>> {
-    let mut known: HashMap<Vec<u64>, Option<Rc<Inverse>>> = HashMap::new();
-    let blocks = blocks(level, (clusters, tree, motions), subdomains, constraints, gather);
-    let of_group = |(members, blocks): (&std::ops::Range<usize>, &Blocks)| {
-        let entry = |(&(row, column), block): (&(u32, u32), &[f64; MODES * MODES])| {
-            [u64::from(row) << 32 | u64::from(column)].into_iter().chain(block.map(f64::to_bits)).collect::<Vec<_>>()
-        };
-        let key: Vec<u64> = [members.len() as u64].into_iter().chain(blocks.iter().flat_map(entry)).collect();
-        known.entry(key).or_insert_with(|| Inverse::new(members.len(), blocks).map(Rc::new)).clone()
-    };
-    tree.members(level).iter().zip(&blocks).map(of_group).collect()
+/// What `G G'` is made of.
+pub struct Equalities<'s> {
+    pub clusters: &'s Clusters,
+    pub connection: &'s Interconnection<'s>,
+    pub subdomains: &'s [Subdomain],
+    pub constraints: &'s Constraints,
+    /// The level of each row ([`super::gluing::level`]).
+    pub of_rows: &'s [Option<usize>],
 }
 
-/// Lower blocks of the groups at home here. A row counts for the first subdomain that it is of.
-fn blocks(
-    level: usize,
-    (clusters, tree, motions): (&Clusters, &Tree, &Motions),
-    subdomains: &[Subdomain],
-    constraints: &Constraints,
-    gather: &Gather,
-) -> Vec<Blocks> {
-    let first = subdomains.first().map_or(0, |s| s.id);
-    let modes = modes_of_nodes(level - 1, motions, subdomains);
-    let mut rows: Vec<Vec<(u32, OfRow)>> = vec![Vec::new(); subdomains.len()];
-    // The order of rows depends on what is outside of the group, that of nodes does not.
-    let mut dofs = vec![0; constraints.rows.len()];
-    for entry in (0..subdomains.len()).flat_map(|own| gather.entries(own)) {
-        if entry.slot == constraints.slot_begin[entry.row as usize] {
-            dofs[entry.row as usize] = entry.dof;
-        }
+/// The members of the groups of one level, which are of the level below.
+pub struct OfLevel {
+    /// For each group at home here the inverse of its `G G'` by the gluing between its members; groups with equal blocks share one.
+    /// `None` where something leaves members free.
+    pub inverses: Vec<Option<Rc<Inverse>>>,
+    /// For each member at home here the diagonal block of `G G'` of all equalities that move it.
+    pub diagonals: Vec<Transfer>,
+}
+
+/// What own subdomains have of the rows of a level.
+struct Parts {
+    /// The rows between the members of each one's group, by a number that orders them.
+    rows: Vec<Vec<(u32, OfRow)>>,
+    /// Diagonal blocks.
+    diagonals: Vec<Block>,
+}
+
+impl Equalities<'_> {
+    /// Of the groups of a level. Collective.
+    pub fn of_level(&self, level: usize) -> OfLevel {
+        let Self { connection, .. } = self;
+        let Parts { rows, diagonals } = self.parts(level);
+        let mut known: HashMap<Vec<u64>, Option<Rc<Inverse>>> = HashMap::new();
+        let blocks = self.brought_home(level, rows);
+        let of_group = |(members, blocks): (&std::ops::Range<usize>, &Blocks)| {
+            let entry = |(&(row, column), block): (&(u32, u32), &Block)| {
+                let place = u64::from(row) << 32 | u64::from(column);
+                [place].into_iter().chain(block.map(f64::to_bits)).collect::<Vec<_>>()
+            };
+            let key: Vec<u64> = [members.len() as u64].into_iter().chain(blocks.iter().flat_map(entry)).collect();
+            known.entry(key).or_insert_with(|| Inverse::new(members.len(), blocks).map(Rc::new)).clone()
+        };
+        let inverses = connection.tree.members(level).iter().zip(&blocks).map(of_group).collect();
+        let sums = connection.tree.sum(level - 1, diagonals.as_flattened(), MODES * MODES);
+        let lines = |block: &Block| std::array::from_fn(|i| std::array::from_fn(|j| block[MODES * i + j]));
+        OfLevel { inverses, diagonals: sums.as_chunks().0.iter().map(lines).collect() }
     }
-    gather.moved(modes, |row, values| {
-        let slots = &constraints.slot_subdomain[constraints.slots(row)];
-        let own = (slots[0] as usize).checked_sub(first).filter(|&own| own < subdomains.len());
-        if let Some(own) = own.filter(|_| gluing::level(clusters, constraints, row) == Some(level)) {
-            let of_row = of_groups(clusters, level - 1, slots, values);
-            rows[own].push((dofs[row], of_row));
+
+    /// A row counts for the first subdomain that it is of, in a member for the first of the member. One neighbour exchange.
+    fn parts(&self, level: usize) -> Parts {
+        let Self { clusters, connection, subdomains, constraints, of_rows } = self;
+        let Interconnection { gather, motions, .. } = connection;
+        let first = subdomains.first().map_or(0, |s| s.id);
+        let own = |subdomain: u32| (subdomain as usize).checked_sub(first).filter(|&own| own < subdomains.len());
+        let mut rows: Vec<Vec<(u32, OfRow)>> = vec![Vec::new(); subdomains.len()];
+        let mut diagonals = vec![[0.0; MODES * MODES]; subdomains.len()];
+        // The order of rows depends on what is outside of the group, that of nodes does not.
+        let mut dofs = vec![0; constraints.rows.len()];
+        for entry in (0..subdomains.len()).flat_map(|own| gather.entries(own)) {
+            if entry.slot == constraints.slot_begin[entry.row as usize] {
+                dofs[entry.row as usize] = entry.dof;
+            }
         }
-    });
-    let mut outgoing = vec![Vec::new(); tree.comm().size()];
-    for (own, mut rows) in rows.into_iter().enumerate() {
-        rows.sort_by_key(|row| row.0);
-        let mut blocks = Blocks::new();
-        for (_, of_row) in &rows {
-            work::add(MODES * MODES * of_row.len() * (of_row.len() + 1), size_of_val(&of_row[..]));
-            for (at, (column, b)) in of_row.iter().enumerate() {
-                for (row, a) in &of_row[at..] {
-                    let block = blocks.entry((*row, *column)).or_insert([0.0; MODES * MODES]);
-                    for (line, a) in block.as_chunks_mut::<MODES>().0.iter_mut().zip(a) {
-                        line.iter_mut().zip(b).for_each(|(x, b)| *x += a * b);
+        gather.moved(modes_of_nodes(level - 1, motions, subdomains), |row, values| {
+            let Some(of_row) = of_rows[row].filter(|of_row| *of_row >= level) else { return };
+            let slots = &constraints.slot_subdomain[constraints.slots(row)];
+            let members = of_groups(clusters, level - 1, slots, values);
+            let member = |subdomain: u32| clusters.group(level - 1, subdomain as usize);
+            for (of_member, (_, six)) in slots.chunk_by(|&a, &b| member(a) == member(b)).zip(&members) {
+                if let Some(own) = own(of_member[0]) {
+                    add_product(&mut diagonals[own], six, six);
+                }
+            }
+            if let Some(own) = own(slots[0]).filter(|_| of_row == level) {
+                rows[own].push((dofs[row], members));
+            }
+        });
+        Parts { rows, diagonals }
+    }
+
+    /// Lower blocks of the groups at home here. Collective.
+    fn brought_home(&self, level: usize, rows: Vec<Vec<(u32, OfRow)>>) -> Vec<Blocks> {
+        let Self { clusters, connection: Interconnection { tree, .. }, subdomains, .. } = self;
+        let mut outgoing = vec![Vec::new(); tree.comm().size()];
+        for (subdomain, mut rows) in subdomains.iter().zip(rows) {
+            rows.sort_by_key(|row| row.0);
+            let mut blocks = Blocks::new();
+            for (_, of_row) in &rows {
+                work::add(MODES * MODES * of_row.len() * (of_row.len() + 1), size_of_val(&of_row[..]));
+                for (at, (column, b)) in of_row.iter().enumerate() {
+                    for (row, a) in &of_row[at..] {
+                        add_product(blocks.entry((*row, *column)).or_insert([0.0; MODES * MODES]), a, b);
                     }
                 }
             }
+            let group = clusters.group(level, subdomain.id);
+            let to = &mut outgoing[tree.home(clusters.begin(level, group))];
+            for ((row, column), block) in blocks {
+                to.extend([u64::from(row), u64::from(column)]);
+                to.extend(block.map(f64::to_bits));
+            }
         }
-        let group = clusters.group(level, first + own);
-        let to = &mut outgoing[tree.home(clusters.begin(level, group))];
-        for ((row, column), block) in blocks {
-            to.extend([u64::from(row), u64::from(column)]);
-            to.extend(block.map(f64::to_bits));
+        let groups = tree.groups(level);
+        let mut sums = vec![Blocks::new(); groups.len()];
+        for message in tree.comm().all_to_all(outgoing) {
+            for &[row, column, ref block @ ..] in message.as_chunks::<{ 2 + MODES * MODES }>().0 {
+                let group = clusters.group(level, clusters.begin(level - 1, row as usize));
+                let begin = clusters.children(level, group).start as u64;
+                let at = ((row - begin) as u32, (column - begin) as u32);
+                let sum = sums[group - groups.start].entry(at).or_insert([0.0; MODES * MODES]);
+                sum.iter_mut().zip(block).for_each(|(sum, bits)| *sum += f64::from_bits(*bits));
+            }
         }
+        sums
     }
-    let groups = tree.groups(level);
-    let mut sums = vec![Blocks::new(); groups.len()];
-    for message in tree.comm().all_to_all(outgoing) {
-        for &[row, column, ref block @ ..] in message.as_chunks::<{ 2 + MODES * MODES }>().0 {
-            let group = clusters.group(level, clusters.begin(level - 1, row as usize));
-            let begin = clusters.children(level, group).start as u64;
-            let at = ((row - begin) as u32, (column - begin) as u32);
-            let sum = sums[group - groups.start].entry(at).or_insert([0.0; MODES * MODES]);
-            sum.iter_mut().zip(block).for_each(|(sum, bits)| *sum += f64::from_bits(*bits));
-        }
+}
+
+/// `block += a b'`.
+fn add_product(block: &mut Block, a: &[f64; MODES], b: &[f64; MODES]) {
+    for (line, a) in block.as_chunks_mut::<MODES>().0.iter_mut().zip(a) {
+        line.iter_mut().zip(b).for_each(|(x, b)| *x += a * b);
     }
-    sums
 }
 
 /// The modes of the groups of a level at the nodes of own subdomains, `[component][mode]`. Congruent groups have equal bits on
@@ -119,9 +162,8 @@ fn modes_of_nodes<'s>(
     motions: &'s Motions,
     subdomains: &'s [Subdomain],
 ) -> impl Fn(usize, usize) -> [[f64; MODES]; 3] + 's {
-    let shapes: Vec<RigidModes> = subdomains.iter().map(|s| RigidModes::new(&s.shape)).collect();
     move |own, node| match level {
-        0 => shapes[own].at(subdomains[own].shape[node]),
+        0 => motions.shapes[own].at(subdomains[own].shape[node]),
         _ => motions.levels[level][own].at(subdomains[own].points[node]),
     }
 }
@@ -137,38 +179,6 @@ fn of_groups(clusters: &Clusters, level: usize, slots: &[u32], values: &[[f64; M
         }
     }
     of_row
-}
-
-/// The diagonal blocks of `G G'` of the groups of a level, by the equalities of higher levels, that are at home here. Collective.
-pub fn diagonal(
-    level: usize,
-    (clusters, tree, motions): (&Clusters, &Tree, &Motions),
-    subdomains: &[Subdomain],
-    constraints: &Constraints,
-    gather: &Gather,
-) -> Vec<[[f64; MODES]; MODES]> {
-    let first = subdomains.first().map_or(0, |s| s.id);
-    let mut blocks = vec![[0.0; MODES * MODES]; subdomains.len()];
-    gather.moved(modes_of_nodes(level, motions, subdomains), |row, values| {
-        if gluing::level(clusters, constraints, row).is_none_or(|of_row| of_row <= level) {
-            return;
-        }
-        let slots = &constraints.slot_subdomain[constraints.slots(row)];
-        // A row counts for the first subdomain of the group that it is of.
-        let mut firsts =
-            slots.chunk_by(|&a, &b| clusters.group(level, a as usize) == clusters.group(level, b as usize));
-        for (_, six) in of_groups(clusters, level, slots, values) {
-            let of = firsts.next().map_or(usize::MAX, |slots| slots[0] as usize);
-            let Some(block) = of.checked_sub(first).and_then(|own| blocks.get_mut(own)) else { continue };
-            for (line, a) in block.as_chunks_mut::<MODES>().0.iter_mut().zip(&six) {
-                line.iter_mut().zip(&six).for_each(|(x, b)| *x += a * b);
-            }
-        }
-    });
-    let sums = tree.sum(level, blocks.as_flattened(), MODES * MODES);
-    sums.chunks_exact(MODES * MODES)
-        .map(|block| std::array::from_fn(|i| std::array::from_fn(|j| block[MODES * i + j])))
-        .collect()
 }
 
 impl Inverse {

@@ -49,7 +49,7 @@ fn modes_of_groups_are_orthonormal_and_sums_of_their_childrens() {
     for scene in scenes() {
         on_ranks(&scene, 1, |setup| {
             let clusters = &setup.discrete.decomposition.clusters;
-            let Motions { levels, transfers } = &setup.motions;
+            let Motions { levels, transfers, .. } = &setup.motions;
             for level in 1..=clusters.levels() {
                 for group in 0..clusters.count(level) {
                     let members = clusters.begin(level, group)..clusters.begin(level, group + 1);

@@ -15,8 +15,7 @@ pub struct Tree<'a> {
     comm: &'a dyn Comm,
     /// Number of own subdomains.
     own: usize,
-    /// The first subdomain of each rank, and the end.
-    ends: Vec<usize>,
+    shares: Shares,
     levels: Vec<Level>,
     /// Number of clusters at home on each rank.
     pub clusters: Shares,
@@ -38,18 +37,16 @@ struct Level {
 impl<'a> Tree<'a> {
     /// Of subdomains in these shares. Local.
     pub fn new(comm: &'a dyn Comm, clusters: &Clusters, shares: &Shares) -> Self {
-        let mut ends = vec![0];
-        shares.0.iter().for_each(|count| ends.push(ends[ends.len() - 1] + count));
-        let owned = |rank: usize| ends[rank]..ends[rank + 1];
-        let levels = (1..=clusters.levels()).map(|level| Level::new(clusters, level, comm.rank(), &owned, &ends));
+        let owned = |rank: usize| shares.begin(rank)..shares.begin(rank + 1);
+        let levels = (1..=clusters.levels()).map(|level| Level::new(clusters, level, owned(comm.rank()), shares));
         let at_home = (0..comm.size()).map(|rank| clusters.beginning(clusters.levels(), owned(rank)).len());
         let (levels, clusters) = (levels.collect(), Shares::new(at_home.collect()));
-        Self { comm, own: owned(comm.rank()).len(), levels, clusters, ends }
+        Self { comm, own: owned(comm.rank()).len(), levels, clusters, shares: shares.clone() }
     }
 
     /// The rank that owns a subdomain.
     pub fn home(&self, subdomain: usize) -> usize {
-        owner(&self.ends, subdomain)
+        self.shares.owner(subdomain)
     }
 
     /// Levels above the subdomains.
@@ -159,18 +156,12 @@ impl<'a> Tree<'a> {
 }
 
 impl Level {
-    fn new(
-        clusters: &Clusters,
-        level: usize,
-        rank: usize,
-        owned: &dyn Fn(usize) -> Range<usize>,
-        ends: &[usize],
-    ) -> Self {
-        let (groups, children) = (clusters.beginning(level, owned(rank)), clusters.beginning(level - 1, owned(rank)));
+    fn new(clusters: &Clusters, level: usize, own: Range<usize>, shares: &Shares) -> Self {
+        let (groups, children) = (clusters.beginning(level, own.clone()), clusters.beginning(level - 1, own));
         // What is before the first group belongs to the one before.
         let first = if groups.is_empty() { children.end } else { clusters.children(level, groups.start).start };
         let leaving = first.min(children.end).saturating_sub(children.start);
-        let home = |group: usize| owner(ends, clusters.begin(level, group));
+        let home = |group: usize| shares.owner(clusters.begin(level, group));
         let above =
             (leaving > 0).then(|| (home(clusters.group(level, clusters.begin(level - 1, children.start))), leaving));
         let members = |group: usize| {
@@ -180,7 +171,7 @@ impl Level {
         let members: Vec<Range<usize>> = groups.clone().map(members).collect();
         let mut below: Vec<(usize, usize)> = Vec::new();
         for child in children.end..members.last().map_or(0, |last| first + last.end) {
-            let rank = owner(ends, clusters.begin(level - 1, child));
+            let rank = shares.owner(clusters.begin(level - 1, child));
             match below.last_mut() {
                 Some((last, count)) if *last == rank => *count += 1,
                 _ => below.push((rank, 1)),
@@ -188,9 +179,4 @@ impl Level {
         }
         Self { groups, members, above, below, buffers: RefCell::default() }
     }
-}
-
-/// The rank that owns a subdomain, given where those of each rank end.
-fn owner(ends: &[usize], subdomain: usize) -> usize {
-    ends.partition_point(|&end| end <= subdomain) - 1
 }
