@@ -67,11 +67,8 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
     let held = arguments.ranks.map(|ranks| (ranks, memory.held(ranks)));
     held.iter().for_each(|(ranks, rows)| monitor.event(&Event::Held { ranks: *ranks, rows: rows.clone() }));
     // A level has as many cells along an edge.
-    let mut parts: Vec<f64> = Vec::new();
-    for level in Cascade::Auto.before(source.level, &scene) {
-        parts.push((level as f64 / source.level as f64).powi(3));
-    }
-    parts.push(1.0);
+    let levels = Cascade::Auto.before(source.level, &scene).into_iter().chain([source.level]);
+    let parts: Vec<f64> = levels.map(|level| (level as f64 / source.level as f64).powi(3)).collect();
     let forecast = arguments.ranks.map(|ranks| forecast(&sizes, &memory, ranks, &parts));
     forecast.iter().for_each(|forecast| monitor.event(&Event::Forecast(forecast.clone())));
     warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));

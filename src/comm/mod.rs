@@ -137,16 +137,16 @@ pub fn from_root(comm: &dyn Comm, mine: Vec<u64>) -> Vec<u64> {
 
 /// Integers of all ranks in rank order; lengths may differ.
 pub fn all_gather_u64(comm: &dyn Comm, mine: &[u64]) -> Vec<u64> {
-    of_ranks(comm, mine).1
+    of_ranks(comm, mine).concat()
 }
 
-/// Lengths and integers of all ranks. Messages are bits: doubles are not looked at on their way.
-fn of_ranks(comm: &dyn Comm, mine: &[u64]) -> (Vec<usize>, Vec<u64>) {
+/// Integers of all ranks, by rank. Messages are bits: doubles are not looked at on their way.
+pub fn of_ranks(comm: &dyn Comm, mine: &[u64]) -> Vec<Vec<u64>> {
     let lengths = comm.all_gather(&[mine.len() as f64], &vec![1; comm.size()]);
     let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
     let mine: Vec<f64> = mine.iter().map(|bits| f64::from_bits(*bits)).collect();
-    let all = comm.all_gather(&mine, &lengths).into_iter().map(f64::to_bits).collect();
-    (lengths, all)
+    let mut all = comm.all_gather(&mine, &lengths).into_iter().map(f64::to_bits);
+    lengths.into_iter().map(|length| all.by_ref().take(length).collect()).collect()
 }
 
 /// Sums of counts over all ranks.
@@ -159,9 +159,7 @@ pub fn sums<const N: usize>(comm: &dyn Comm, mine: [u64; N]) -> [u64; N] {
 /// Texts of all ranks in rank order.
 pub fn all_gather_text(comm: &dyn Comm, mine: &str) -> Vec<String> {
     let packed: Vec<u64> = mine.bytes().map(u64::from).collect();
-    let (lengths, all) = of_ranks(comm, &packed);
-    let mut all = &all[..];
-    let text =
-        |length: usize| -> Vec<u8> { all.split_off(..length).into_iter().flatten().map(|byte| *byte as u8).collect() };
-    lengths.into_iter().map(text).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).collect()
+    let text = |bytes: Vec<u64>| -> Vec<u8> { bytes.into_iter().map(|byte| byte as u8).collect() };
+    let texts = of_ranks(comm, &packed).into_iter().map(text);
+    texts.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).collect()
 }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use super::surface::unit;
 use super::{ContactError, ContactPair};
-use crate::comm::Comm;
+use crate::comm::{Comm, of_ranks};
 use crate::vector::{difference, dot, length};
 
 /// Distance of a unit vector to the others or to their span from which a direction counts as independent.
@@ -33,7 +33,7 @@ pub fn check<'a>(
         mine.extend([*slave, u64::from(master.is_some()), master.unwrap_or_default()]);
         mine.extend(contacts.iter().map(|&contact| contact as u64));
     }
-    let all = comm.all_to_all(vec![mine; comm.size()]);
+    let all = of_ranks(comm, &mine);
     let nodes = all.iter().map(|of_rank| of_rank[0] as usize).sum();
     let Some(first) = all.iter().filter(|of_rank| of_rank[0] > 0).min_by_key(|of_rank| &of_rank[1..]) else {
         return Ok(());
