@@ -8,6 +8,7 @@
 //! integrates over boundary faces, [`quality`] counts elements that no computation could use, [`whole`] finds what only looks
 //! joined ([`boxes`] of what is [`near`]) and the pieces of a mesh by their [`connectivity`]. No displacements, no material.
 
+pub mod bisection;
 pub mod boxes;
 pub mod brick;
 pub mod connectivity;
