@@ -33,7 +33,7 @@ impl<'a> Region<'a> {
 
     /// What an integration point remembers.
     #[inline]
-    fn committed(&self, point: usize) -> &'a History {
+    pub fn committed(&self, point: usize) -> &'a History {
         self.history.get(point).unwrap_or(&History::VIRGIN)
     }
 }

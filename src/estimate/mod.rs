@@ -23,6 +23,7 @@
 //! too. At a plastic front the stress has a kink: quadratic tetrahedra have a small error if faces lie along it, and the estimate,
 //! whose patches know nothing of that, is rather too large; if elements lie across it, rather too small.
 
+pub mod bregman;
 mod polynomial;
 mod recovery;
 mod rule;
@@ -85,7 +86,7 @@ fn difference(
         let rule = rule(region.subdomain.elements.kind());
         let errors = squares(region, &samples, &rule, |nodes, values| stress(own, nodes, values));
         let hooke = region.material.hooke();
-        let size = samples.iter().map(|s| s.weight * hooke.complementary_square(&s.stress)).sum::<f64>();
+        let size = samples.iter().map(|s| s.weight * hooke.complementary_square(&s.value)).sum::<f64>();
         (errors, size)
     };
     let (errors, stresses) = regions.iter().zip(u).enumerate().map(of).unzip();
@@ -105,7 +106,7 @@ fn squares(region: &Region, samples: &[Sample], rule: &[Place], stress: impl Fn(
             let volume: f64 = place.volume.iter().zip(samples).map(|(c, s)| c * s.weight).sum();
             let mut difference = stress(nodes, &place.nodes);
             for (c, sample) in place.samples.iter().zip(samples) {
-                difference.iter_mut().zip(sample.stress).for_each(|(d, s)| *d -= c * s);
+                difference.iter_mut().zip(sample.value).for_each(|(d, s)| *d -= c * s);
             }
             volume * region.material.hooke().complementary_square(&difference)
         };

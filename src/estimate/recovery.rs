@@ -1,4 +1,4 @@
-//! Recovered stresses at the nodes.
+//! Recovered stresses or strains at the nodes.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ const CLOSED: f64 = 1e-6;
 /// Numbers that tell whether they do: the sum, and that of the sizes.
 const CLOSURE: usize = 4;
 
-/// The recovered stress at each node of each own subdomain, from the samples in each. Collective.
+/// The recovered value at each node of each own subdomain, from the samples in each. Collective.
 pub fn recover(sums: &NodeSums, subdomains: &[&Subdomain], samples: impl Fn(usize) -> Vec<Sample>) -> Vec<Vec<Voigt>> {
     let mut patches: Vec<Patches> = subdomains.iter().map(|subdomain| Patches::new(subdomain)).collect();
     let mut values: Vec<Vec<f64>> = patches.iter().enumerate().map(|(own, patch)| patch.sums(&samples(own))).collect();
@@ -111,7 +111,7 @@ impl<'a> Patches<'a> {
             for &node in nodes {
                 let sums = &mut sums[width * self.number(node)..][CLOSURE..width];
                 for sample in samples {
-                    polynomial::add(self.n, difference(sample.place, self.point(node)), &sample.stress, sums);
+                    polynomial::add(self.n, difference(sample.place, self.point(node)), &sample.value, sums);
                 }
             }
         }
@@ -180,7 +180,7 @@ impl<'a> Patches<'a> {
         }
     }
 
-    /// The recovered stress at every node.
+    /// The recovered value at every node.
     fn nodal(&self) -> Vec<Voigt> {
         let mut nodal = vec![[0.0; 6]; self.vertex.len()];
         for (vertex, &node) in self.nodes.iter().enumerate() {
@@ -216,11 +216,11 @@ fn area(corners: impl Iterator<Item = [f64; 3]> + Clone) -> [f64; 3] {
 /// Mean of the samples by volume.
 fn centre(samples: &[Sample]) -> Sample {
     let weight: f64 = samples.iter().map(|sample| sample.weight).sum();
-    let mut mean = Sample { place: [0.0; 3], weight, stress: [0.0; 6] };
+    let mut mean = Sample { place: [0.0; 3], weight, value: [0.0; 6] };
     for sample in samples {
         let share = sample.weight / weight;
         mean.place.iter_mut().zip(sample.place).for_each(|(mean, x)| *mean += share * x);
-        mean.stress.iter_mut().zip(sample.stress).for_each(|(mean, s)| *mean += share * s);
+        mean.value.iter_mut().zip(sample.value).for_each(|(mean, s)| *mean += share * s);
     }
     mean
 }

@@ -172,3 +172,44 @@ fn scenes_of_quadratic() -> [Scene; 1] {
     let [_, _, nine] = scenes("tet10");
     [nine]
 }
+
+/// Where nothing yields the Bregman distance is half of the estimate: strains are recovered as stresses are.
+#[test]
+fn the_bregman_distance_of_an_elastic_body_is_half_of_the_squared_error() {
+    for (kind, cells) in [(Kind::Tet4, 4), (Kind::Hex8, 4), (Kind::Tet10, 2)] {
+        let sphere = sphere(kind, cells);
+        let u: Vec<f64> = sphere.points.iter().flat_map(|&x| lame(x)).collect();
+        let shares = Shares::new(vec![1]);
+        let clusters = Clusters::new(shares.total(), &[]);
+        let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
+        let (sums, region, u) = (NodeSums::new(&Solo, &alone), [Region::virgin(&sphere, &orders::MATERIAL)], vec![u]);
+        let squares = &estimate(&sums, &region, &u).errors[0];
+        let distances = &bregman::distances(&sums, &region, &u)[0];
+        let largest = squares.iter().copied().fold(0.0, f64::max);
+        assert!(largest > 0.0 && squares.len() == distances.len());
+        for (square, distance) in squares.iter().zip(distances) {
+            assert!((0.5 * square - distance).abs() < 1e-9 * largest, "{kind:?}: {square} {distance}");
+        }
+    }
+}
+
+/// In a body that flows, the distance is that of the potential, which is far less than that of the elastic energy.
+#[test]
+fn the_bregman_distance_is_between_nothing_and_the_elastic_one() {
+    let scene = two_bricks(&["load.top.traction=[0.0, 0.0, -0.2]"]);
+    let found = on_ranks(&scene, 1, |setup| {
+        let regions: Vec<Region> =
+            setup.subdomains().iter().enumerate().map(|(own, s)| Region::virgin(s, setup.material(own))).collect();
+        let u: Torn = setup
+            .subdomains()
+            .iter()
+            .map(|s| s.points.iter().flat_map(|x| [0.01 * x[0] * x[2], 0.0, 0.0]).collect())
+            .collect();
+        let sums = NodeSums::new(&Solo, &setup.discrete.decomposition);
+        let squares: f64 = estimate(&sums, &regions, &u).errors.iter().flatten().sum();
+        let distances = bregman::distances(&sums, &regions, &u);
+        assert!(distances.iter().flatten().all(|&distance| distance >= 0.0));
+        (distances.iter().flatten().sum::<f64>(), squares)
+    });
+    assert!(found[0].0 > 0.0 && found[0].1 > 0.0);
+}

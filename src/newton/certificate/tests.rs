@@ -24,7 +24,7 @@ fn solve(scene: &Scene, ranks: usize) -> Solution {
         for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(&solved.u) {
             let material = discrete.materials[subdomain.material];
             let samples = stress::samples(&Region::virgin(subdomain, &material), u);
-            stresses.extend(samples.iter().map(|sample| (sample.weight, sample.stress, material)));
+            stresses.extend(samples.iter().map(|sample| (sample.weight, sample.value, material)));
         }
         (solved.summary, stresses)
     });
