@@ -8,6 +8,7 @@ mod conduct;
 pub mod keeper;
 mod levels;
 mod plan;
+mod refined;
 mod resume;
 mod room;
 mod solve;

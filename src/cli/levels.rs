@@ -23,6 +23,7 @@ use crate::restart::checkpoint::{Unfit, pack, unpack};
 use crate::restart::{self, Standing};
 use crate::results;
 use crate::results::checkpoint::{self, Checkpoint};
+use crate::results::piece::Field;
 use crate::results::vtkhdf;
 use crate::scene::Scene;
 use crate::sizing;
@@ -72,8 +73,12 @@ pub(super) fn carry_out(
     let keeper = Keeper::new(comm, timer, conduct.checkpoints, signals, kept);
     let run = Run { comm, timer, keeper: &keeper, scene: scene.to_toml(), ignore_memory: conduct.ignore_memory };
 
-    let coarser = run.coarser_levels(&mut plan, found, &mut checkpoint, &mut monitor)?;
-    let (discrete, mut solved) = run.level(&mut plan, scene, coarser, checkpoint, &mut monitor)?;
+    let (discrete, mut solved) = if scene.solver.error.is_some() {
+        run.refined(&mut plan, scene, checkpoint, &mut monitor)?
+    } else {
+        let coarser = run.coarser_levels(&mut plan, found, &mut checkpoint, &mut monitor)?;
+        run.level(&mut plan, scene, coarser, checkpoint, &mut monitor)?
+    };
     timer.time("output", || vtkhdf::write(comm, &result, &solved.piece, &solved.records))?;
     // What is left is little, or waits for who reads it.
     keeper.end_at_once();
@@ -84,6 +89,7 @@ pub(super) fn carry_out(
     let told = tight.into_iter().chain(told).collect();
     solved.summary.mesh_reading_mb = discrete.reading_mb;
     solved.summary.cascade = plan.rows;
+    solved.summary.refinements = plan.refinements;
     let of_solution = complete(&mut solved, told, &table);
     results::write_json(comm, &summary, &solved.summary)?;
     if let Some(directory) = &conduct.trace {
@@ -126,14 +132,14 @@ fn tell_end(monitor: &mut Monitor, summary: &Summary, table: PhaseTable, warning
 }
 
 /// What all levels of a run share.
-struct Run<'a> {
-    comm: &'a dyn Comm,
-    timer: &'a Timer,
+pub(super) struct Run<'a> {
+    pub comm: &'a dyn Comm,
+    pub timer: &'a Timer,
     keeper: &'a Keeper<'a>,
     /// The scene at its level.
     scene: String,
     /// Whether to begin without enough memory.
-    ignore_memory: bool,
+    pub ignore_memory: bool,
 }
 
 impl Run<'_> {
@@ -192,7 +198,7 @@ impl Run<'_> {
         checkpoint: Option<Checkpoint>,
         monitor: &mut Monitor,
     ) -> Result<(Discrete, Solved), Failure> {
-        let Self { comm, timer, keeper, .. } = *self;
+        let Self { comm, timer, .. } = *self;
         if let Some((coarse, solved)) = &coarser {
             plan.yielding = timer.time("interpolation", || expected_yielding(comm, (coarse, solved), scene));
         }
@@ -201,9 +207,22 @@ impl Run<'_> {
         if let Some(counted) = Counted::of_read(scene, &discrete.bodies) {
             discrete.warnings.extend(make_room(comm, &counted, self.ignore_memory)?);
         }
-        self.tell_sizes(plan, scene, &discrete, monitor);
         let begin = self.begin(scene, &discrete, coarser, checkpoint, monitor)?;
-        let mut watch = Watch { run: self, plan, discrete: &discrete, monitor };
+        self.solve_problem(plan, scene, (discrete, Vec::new()), begin, monitor)
+    }
+
+    /// Solves a discrete problem, with arrays of checkpoints that say what its meshes are. Collective.
+    pub(super) fn solve_problem(
+        &self,
+        plan: &Plan,
+        scene: &Scene,
+        (discrete, of_meshes): (Discrete, Vec<Field>),
+        begin: Begin,
+        monitor: &mut Monitor,
+    ) -> Result<(Discrete, Solved), Failure> {
+        let Self { comm, timer, keeper, .. } = *self;
+        self.tell_sizes(plan, scene, &discrete, monitor);
+        let mut watch = Watch { run: self, plan, discrete: &discrete, of_meshes: &of_meshes, monitor };
         let solved = study::solve(scene, &discrete, comm, begin, timer, &mut watch);
         match (solved, keeper.end()) {
             (Err(StudyError::Stopped), Some(end)) => Err(end),
@@ -219,7 +238,7 @@ impl Run<'_> {
         monitor.event(&Event::Sizes { scene: name, level, ranks: self.comm.size(), sizes });
         discrete.contacts.rows.iter().for_each(|row| monitor.event(&Event::Contact(row.clone())));
         discrete.reading_mb.into_iter().for_each(|megabytes| monitor.event(&Event::Reading { megabytes }));
-        if let [_] = plan.levels[..] {
+        if plan.levels.len() == 1 && plan.refinements.is_empty() {
             let warnings = warnings(scene, &discrete.warnings, subdomains, self.comm);
             warnings.into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
         }
@@ -239,13 +258,7 @@ impl Run<'_> {
         let start =
             coarser.map(|(coarse, solved)| timer.time("interpolation", || refine(comm, (&coarse, &solved), discrete)));
         if let Some(file) = checkpoint {
-            let standing = timer.time("checkpoints", || unpack(comm, discrete, &file));
-            let standing = standing.and_then(|standing| file.close().map(|()| standing).map_err(Unfit::from));
-            let (standing, is_recut) = standing.map_err(unfit)?;
-            if is_recut {
-                monitor.event(&Event::Warning(RECUT.into()));
-            }
-            return Ok(Begin::At(Box::new(standing)));
+            return self.at(discrete, file, monitor);
         }
         if let Some(initial) = &scene.initial {
             let earlier = timer.time("initial state", || restart::state::earlier(comm, scene, discrete, initial));
@@ -253,10 +266,21 @@ impl Run<'_> {
         }
         Ok(start.map_or(Begin::Rest, Begin::Near))
     }
+
+    /// Where a checkpoint stands. Collective.
+    pub(super) fn at(&self, discrete: &Discrete, file: Checkpoint, monitor: &mut Monitor) -> Result<Begin, Failure> {
+        let standing = self.timer.time("checkpoints", || unpack(self.comm, discrete, &file));
+        let standing = standing.and_then(|standing| file.close().map(|()| standing).map_err(Unfit::from));
+        let (standing, is_recut) = standing.map_err(unfit)?;
+        if is_recut {
+            monitor.event(&Event::Warning(RECUT.into()));
+        }
+        Ok(Begin::At(Box::new(standing)))
+    }
 }
 
 /// Why a checkpoint is of no use for the scene.
-fn unfit(unfit: Unfit) -> Failure {
+pub(super) fn unfit(unfit: Unfit) -> Failure {
     match unfit {
         Unfit::Mesh => Failure::Scene(unfit.to_string()),
         Unfit::Unreadable(reason) => Failure::Input(format!("the checkpoint cannot be read: {reason}")),
@@ -268,6 +292,7 @@ struct Watch<'a> {
     run: &'a Run<'a>,
     plan: &'a Plan,
     discrete: &'a Discrete,
+    of_meshes: &'a [Field],
     monitor: &'a mut Monitor,
 }
 
@@ -279,7 +304,8 @@ impl Watcher for Watch<'_> {
     fn stops(&mut self, standing: &dyn Fn() -> Standing) -> bool {
         let Run { comm, keeper, scene, .. } = self.run;
         let write = |path: &Path| {
-            let (mut texts, arrays) = pack(*comm, self.discrete, standing());
+            let (mut texts, mut arrays) = pack(*comm, self.discrete, standing());
+            arrays.extend_from_slice(self.of_meshes);
             texts.extend(self.plan.labels(scene));
             checkpoint::write(*comm, path, &texts, &arrays)
         };

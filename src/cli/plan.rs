@@ -10,7 +10,7 @@ use crate::comm::Comm;
 use crate::comm::agree::agree;
 use crate::monitor::json::JsonLines;
 use crate::monitor::trace;
-use crate::record::rows::CascadeRow;
+use crate::record::rows::{CascadeRow, RefinementRow};
 use crate::results::OutputError;
 use crate::results::checkpoint;
 use crate::results::provenance::{COMMIT, VERSION};
@@ -31,6 +31,9 @@ pub(super) struct Plan {
     pub yielding: Option<Vec<Vec<bool>>>,
     /// What the levels before took.
     pub rows: Vec<CascadeRow>,
+    /// Meshes that were solved on before, where the scene asks for an error.
+    #[serde(default)]
+    pub refinements: Vec<RefinementRow>,
 }
 
 impl Plan {

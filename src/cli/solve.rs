@@ -12,7 +12,7 @@ use super::{Failure, Source, find, values};
 use crate::comm::Comm;
 use crate::material::Law;
 use crate::monitor::timing::Timer;
-use crate::scene::{Preconditioner, Qp, Scene};
+use crate::scene::{ErrorOf, Preconditioner, Qp, Scene};
 
 /// Arguments of `solve`.
 #[derive(Debug, Args)]
@@ -31,6 +31,15 @@ pub struct Solve {
     /// Stop when the algebraic error is at most this share of the discretisation error. Short for --set solver.accuracy=...
     #[arg(long, value_name = "X", value_parser = values::accuracy, allow_negative_numbers = true)]
     accuracy: Option<String>,
+    /// Refine meshes until the error of the energy is at most this: 0.01 or 1%. Short for --set solver.error=...
+    #[arg(long, value_name = "X", value_parser = values::error, allow_negative_numbers = true)]
+    error: Option<String>,
+    /// What the error is of: energy or stress. Short for --set solver.error_of=...
+    #[arg(long, value_name = "NAME", value_parser = values::name::<ErrorOf>)]
+    error_of: Option<String>,
+    /// Refined meshes have so many unknowns at most. Short for --set solver.max_unknowns=...
+    #[arg(long, value_name = "N")]
+    max_unknowns: Option<u64>,
     /// Solve half the level first, and so on, and start from there: auto (where it pays), on or off.
     #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
     cascade: Cascade,
@@ -71,15 +80,19 @@ impl Cascade {
 /// If the scene is bad or files cannot be read or written.
 pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
     let timer = Timer::start();
-    let Solve { mut source, out, qp, preconditioner, accuracy, cascade, conduct } = arguments;
+    let Solve { mut source, out, qp, preconditioner, accuracy, error, error_of, max_unknowns, cascade, conduct } =
+        arguments;
     let shorthand = |key: &str, value: Option<String>| value.map(|v| format!("solver.{key}={v}"));
     source.sets.extend(shorthand("qp", qp));
     source.sets.extend(shorthand("preconditioner", preconditioner));
     source.sets.extend(shorthand("accuracy", accuracy));
+    source.sets.extend(shorthand("error", error));
+    source.sets.extend(shorthand("error_of", error_of));
+    source.sets.extend(shorthand("max_unknowns", max_unknowns.map(|n| n.to_string())));
     let found = find(&source, comm)?;
     let scene = found.at_level(source.level, &source.sets)?;
-    let mut levels = cascade.before(source.level, &scene);
+    let mut levels = if scene.solver.error.is_some() { Vec::new() } else { cascade.before(source.level, &scene) };
     levels.push(source.level);
-    let plan = Plan { source, levels, yielding: None, rows: Vec::new() };
+    let plan = Plan { source, levels, yielding: None, rows: Vec::new(), refinements: Vec::new() };
     carry_out(plan, &found, &scene, None, Setting { timer, out, conduct, signals }, comm)
 }

@@ -28,6 +28,13 @@ pub(super) fn name<T: DeserializeOwned>(text: &str) -> Result<String, String> {
     T::deserialize(text.into_deserializer()).map(|_| text.to_owned()).map_err(|error: Error| error.to_string())
 }
 
+/// Of `--error`, a share or in per cent, as TOML has numbers.
+pub(super) fn error(text: &str) -> Result<String, String> {
+    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 100.0));
+    let share = number.trim().parse::<f64>().ok().map(|x| x / unit).filter(|share| *share > 0.0 && *share < 1.0);
+    share.map(|share| format!("{share:?}")).ok_or_else(|| "it is above 0 and below 1, or 100%".into())
+}
+
 /// Of `--accuracy`, as TOML has numbers.
 pub(super) fn accuracy(text: &str) -> Result<String, String> {
     let share = text.parse::<f64>().ok().filter(|share| *share > 0.0 && *share < 1.0);

@@ -62,8 +62,20 @@ pub fn discretise_expecting(
     yielding: Option<&[Vec<bool>]>,
     comm: &dyn Comm,
 ) -> Result<Discrete, ModelError> {
-    // Bodies and the surfaces that the scene names.
-    let Meshes { bodies, solids, mut warnings } = Meshes::new(scene, comm)?;
+    discretise_meshes(scene, Meshes::new(scene, comm)?, yielding, comm)
+}
+
+/// As [`discretise_expecting`], with meshes that are there already.
+///
+/// # Errors
+/// As there.
+pub fn discretise_meshes(
+    scene: &Scene,
+    Meshes { bodies, solids, mut warnings }: Meshes,
+    yielding: Option<&[Vec<bool>]>,
+    comm: &dyn Comm,
+) -> Result<Discrete, ModelError> {
+    // The surfaces that the scene names.
     let materials: Vec<Material> = scene.material.values().copied().collect();
     let named = Named::new(scene, &bodies);
 

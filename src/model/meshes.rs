@@ -48,13 +48,21 @@ impl Meshes {
     /// If a file cannot be read, or is not what the scene wants.
     pub fn new(scene: &Scene, comm: &dyn Comm) -> Result<Self, MeshError> {
         let Found { solids, warnings } = read(scene, comm)?;
+        Ok(Self { warnings, ..Self::of(scene, solids) })
+    }
+
+    /// Of this rank's parts of the meshes of all bodies that are no bricks.
+    ///
+    /// # Panics
+    /// If one is missing.
+    pub fn of(scene: &Scene, solids: BTreeMap<usize, SolidMesh>) -> Self {
         let shape = |(index, body): (usize, &scene::Body)| match &body.shape {
             scene::Shape::Brick(b) => brick(b),
             _ => Shape::Mesh(solids[&index].counts),
         };
         let shapes = scene.body.values().enumerate();
         let bodies = number_bodies(shapes.map(|(k, body)| (body.element, shape((k, body)), materials(scene, body))));
-        Ok(Self { bodies, solids, warnings })
+        Self { bodies, solids, warnings: Vec::new() }
     }
 }
 
@@ -145,7 +153,7 @@ fn read(scene: &Scene, comm: &dyn Comm) -> Result<Found, MeshError> {
 }
 
 /// The structured body that is to be meshed, if it is one.
-fn mapped(shape: &scene::Shape) -> Option<Mapped> {
+pub fn mapped(shape: &scene::Shape) -> Option<Mapped> {
     match shape {
         scene::Shape::Brick(_) | scene::Shape::Gmsh(_) => None,
         scene::Shape::Sphere(scene::Sphere { inner, outer, cells }) => {

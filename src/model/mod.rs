@@ -12,7 +12,7 @@ pub mod held;
 pub mod history;
 pub mod meshes;
 
-pub use discrete::{Discrete, discretise, discretise_expecting};
+pub use discrete::{Discrete, discretise, discretise_expecting, discretise_meshes};
 
 use thiserror::Error;
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::table::PhaseTable;
 use crate::record::counts::{ContactRow, Sizes};
 use crate::record::forecast::{Forecast, HeldRow};
-use crate::record::rows::NewtonRow;
+use crate::record::rows::{NewtonRow, RefinementRow};
 use crate::record::state::{Errors, Residuals};
 
 /// Something that happened and is worth telling; numbers are those of all ranks together.
@@ -54,6 +54,15 @@ pub enum Event {
         step: u64,
         /// Applications of F in this step.
         hessian_multiplications: u64,
+    },
+    /// What the program chose.
+    Note(String),
+    /// A mesh of a run that refines it was solved on.
+    Refinement {
+        /// What it took, and its error.
+        row: RefinementRow,
+        /// The error that is wanted.
+        goal: f64,
     },
     /// A Newton step is done.
     NewtonStep(NewtonRow),

@@ -7,7 +7,7 @@ use super::events::{Event, Sink};
 use super::table::{Phase, PhaseTable, Spread};
 use crate::record::counts::{ContactRow, Counted, Sizes, Work};
 use crate::record::forecast::{Forecast, HeldRow};
-use crate::record::rows::NewtonRow;
+use crate::record::rows::{NewtonRow, RefinementRow};
 use crate::record::state::{Errors, Residuals};
 
 /// Writes log lines.
@@ -49,7 +49,8 @@ impl Plain {
                 let header = (!std::mem::replace(&mut self.newton_header_written, true)).then(newton_header);
                 header.into_iter().chain([newton_line(row)]).collect()
             }
-            Event::Increment(place) => vec![place.clone()],
+            Event::Increment(text) | Event::Note(text) => vec![text.clone()],
+            Event::Refinement { row, goal } => vec![refinement_line(row, *goal)],
             Event::Phases(table) => phase_lines(table),
             Event::Residuals(residuals) => residual_lines(residuals),
             Event::Errors(errors) => error_line(errors).into_iter().collect(),
@@ -117,6 +118,15 @@ fn forecast_line(Forecast { ranks, levels, seconds, messages }: &Forecast) -> St
 fn contact_line(ContactRow { name, slave, master, rule, conditions }: &ContactRow) -> String {
     let sides = master.as_ref().map_or(slave.clone(), |master| format!("{slave} against {master}"));
     format!("  {:<16}{conditions:>12}  {sides}, {rule}", format!("contact {name}"))
+}
+
+fn refinement_line(row: &RefinementRow, goal: f64) -> String {
+    let RefinementRow { elements, unknowns, error, energy, seconds, .. } = row;
+    format!(
+        "mesh of {elements} elements, {unknowns} unknowns: J = {energy:.6e}, error about {:.2} % ({:.2} % wanted), {seconds:.2} s",
+        100.0 * error,
+        100.0 * goal
+    )
 }
 
 fn newton_header() -> String {

@@ -55,6 +55,31 @@ pub struct NewtonRow {
     pub seconds: f64,
 }
 
+/// A mesh of a run that refines it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RefinementRow {
+    /// Elements.
+    pub elements: u64,
+    /// Unknowns: three a node.
+    pub unknowns: u64,
+    /// Estimated error of what the scene asks for, relative.
+    pub error: f64,
+    /// `J(u)`.
+    pub energy: f64,
+    /// Sum of the Bregman distances (energy), which the error of the energy is estimated from.
+    pub distance: f64,
+    /// `J(u)` is at most so much above its least value on this mesh.
+    pub gap: f64,
+    /// Estimated error of the stress, relative.
+    pub stress: f64,
+    /// Newton steps.
+    pub newton_iterations: Option<u64>,
+    /// Every application of F.
+    pub hessian_multiplications: Option<u64>,
+    /// Wall time in seconds, from mesh to estimate.
+    pub seconds: f64,
+}
+
 /// What the solution on a coarser level took.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CascadeRow {

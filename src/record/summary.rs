@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::counts::{CommunicationRow, ContactRow, Counted, Counters, Sizes, Work};
 use super::forecast::{Forecast, HeldRow};
-use super::rows::{CascadeRow, NewtonRow, StepRow};
+use super::rows::{CascadeRow, NewtonRow, RefinementRow, StepRow};
 use super::state::State;
 
 /// What a run was about and what came out. Lengths, forces and energies are in the scene's units.
@@ -84,4 +84,6 @@ pub struct Summary {
     pub newton: Vec<NewtonRow>,
     /// Coarser levels that were solved before for a start, coarsest first.
     pub cascade: Vec<CascadeRow>,
+    /// Meshes of a run that refines them, coarsest first.
+    pub refinements: Vec<RefinementRow>,
 }

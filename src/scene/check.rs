@@ -283,7 +283,8 @@ fn solver(solver: &Solver) -> Checked {
         ("solver.qp_tolerance", solver.qp_tolerance),
     ];
     let accuracy = solver.accuracy.map(|value| ("solver.accuracy", value));
-    for (key, value) in tolerances.into_iter().chain(accuracy) {
+    let error = solver.error.map(|value| ("solver.error", value));
+    for (key, value) in tolerances.into_iter().chain(accuracy).chain(error) {
         require(value > 0.0 && value < 1.0, key, value, "a relative tolerance must be above 0 and below 1")?;
     }
     for (key, value) in [("solver.newton_limit", solver.newton_limit), ("solver.qp_limit", solver.qp_limit)] {

@@ -44,7 +44,7 @@ pub use initial::Initial;
 pub use load::Load;
 pub use mapped::{Cylinder, Grid, Sphere};
 pub use overrides::{recut, well_formed};
-pub use solver::{Precision, Preconditioner, Qp, Solver};
+pub use solver::{ErrorOf, Precision, Preconditioner, Qp, Solver};
 pub use step::Step;
 pub use surface::{Face, Support, SurfaceError, SurfaceName};
 pub use volumes::{Materials, Volumes};

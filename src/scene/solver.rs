@@ -14,6 +14,15 @@ pub struct Solver {
     /// they decide.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<f64>,
+    /// Meshes are refined until the error is at most this. Without it the mesh is that of the scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// What the error is of.
+    #[serde(skip_serializing_if = "ErrorOf::is_default")]
+    pub error_of: ErrorOf,
+    /// Refined meshes have so many unknowns at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_unknowns: Option<u64>,
     /// Newton steps at most.
     pub newton_limit: usize,
     /// How exactly a quadratic program is solved.
@@ -35,6 +44,9 @@ impl Default for Solver {
             newton_tolerance: 1e-4,
             residual_tolerance: 1e-6,
             accuracy: None,
+            error: None,
+            error_of: ErrorOf::default(),
+            max_unknowns: None,
             newton_limit: 50,
             qp_tolerance: 1e-7,
             qp_limit: 5000,
@@ -42,6 +54,23 @@ impl Default for Solver {
             preconditioner: Preconditioner::Dirichlet,
             precision: Precision::Mixed,
         }
+    }
+}
+
+/// What an error is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ErrorOf {
+    /// The energy `J`, relative to it.
+    #[default]
+    Energy,
+    /// The stress, in the norm of its complementary energy, relative to the stress.
+    Stress,
+}
+
+impl ErrorOf {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
     }
 }
 

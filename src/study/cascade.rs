@@ -69,7 +69,7 @@ fn interpolate(comm: &dyn Comm, coarse: (&[BodyMesh], &[Subdomain], &Torn), fine
         .map(|s| s.nodes.iter().map(|&node| locate(&coarse_bodies[s.body], &fine_bodies[s.body], node)).collect())
         .collect();
     let needed = around.iter().flatten().flat_map(|(nodes, _)| nodes.iter().copied()).collect();
-    let values = fetch(comm, coarse_subdomains, u, needed);
+    let values = fetch(comm, displacements(coarse_subdomains, u), needed);
     around
         .iter()
         .map(|nodes| nodes.iter().flat_map(|(nodes, weights)| mean(&values, nodes, weights)).collect())
@@ -97,15 +97,25 @@ fn mean(values: &HashMap<u64, [f64; 3]>, nodes: &[u64], weights: &[f64]) -> [f64
     std::array::from_fn(|a| nodes.iter().zip(weights).map(|(node, w)| w * values[node][a]).sum())
 }
 
-/// Displacements of the needed coarse nodes, from whichever rank has them. Of several copies that of the lowest subdomain
-/// is taken.
-fn fetch(comm: &dyn Comm, subdomains: &[Subdomain], u: &Torn, needed: HashSet<u64>) -> HashMap<u64, [f64; 3]> {
+/// Displacements of all nodes of subdomains, by number.
+pub(super) fn displacements(subdomains: &[Subdomain], u: &Torn) -> impl Iterator<Item = (u64, [f64; 3])> {
+    let of = |(subdomain, u): (&Subdomain, &Vec<f64>)| {
+        subdomain.nodes.iter().copied().zip(u.as_chunks::<3>().0.to_vec()).collect::<Vec<_>>()
+    };
+    subdomains.iter().zip(u).flat_map(of)
+}
+
+/// Vectors of the needed nodes, from whichever rank knows them. Of several who do the lowest rank counts, and of what it knows
+/// the first. Collective.
+pub(super) fn fetch(
+    comm: &dyn Comm,
+    known: impl Iterator<Item = (u64, [f64; 3])>,
+    needed: HashSet<u64>,
+) -> HashMap<u64, [f64; 3]> {
     let ranks = comm.size() as u64;
     let mut reports = vec![Vec::new(); comm.size()];
-    for (subdomain, u) in subdomains.iter().zip(u) {
-        for (&node, u) in subdomain.nodes.iter().zip(u.chunks_exact(3)) {
-            reports[(node % ranks) as usize].extend([node, u[0].to_bits(), u[1].to_bits(), u[2].to_bits()]);
-        }
+    for (node, x) in known {
+        reports[(node % ranks) as usize].extend([node, x[0].to_bits(), x[1].to_bits(), x[2].to_bits()]);
     }
     let mut directory = HashMap::new();
     for report in comm.all_to_all(reports).concat().chunks_exact(4) {

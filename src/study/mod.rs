@@ -4,6 +4,7 @@
 //! written of each increment (`recorder`): `fields`, [`contact`], rows of the log and the summary (`report`) with the
 //! `limits` of the theory. [`cascade`] makes a start on a finer mesh of a solution.
 
+pub mod adaptive;
 pub mod cascade;
 pub mod contact;
 mod fields;
@@ -23,6 +24,7 @@ use self::recorder::Recorder;
 use self::report::{convergence, loss_of_accuracy, newton_row, place, summarise};
 use crate::comm::Comm;
 use crate::decomposition::sums::NodeSums;
+use crate::estimate::bregman;
 use crate::feti::Torn;
 use crate::feti::dual::Interconnection;
 use crate::material::History;
@@ -58,6 +60,8 @@ pub enum Begin {
     Rest,
     /// Near its solution, which has no history.
     Near(newton::Start),
+    /// Near a solution without history of which a displacement is known.
+    Around(Torn),
     /// From the state that an earlier run left, without its loads.
     After(Earlier),
     /// Where another one stood.
@@ -91,6 +95,10 @@ pub struct Solved {
     pub u: Torn,
     /// Closed contact pairs whose rows are on this rank, by index.
     pub closed: Vec<u64>,
+    /// For each element of each of this rank's subdomains how far its energy is above the least, where a scene asks for an error.
+    pub distances: Option<Vec<Vec<f64>>>,
+    /// Likewise the part of each element in the square of the error of the stress, relative.
+    pub stress_parts: Option<Vec<Vec<f64>>>,
     /// What the integration points of each of this rank's subdomains remember; none where nothing ever yielded.
     pub histories: Vec<Vec<History>>,
 }
@@ -122,6 +130,15 @@ pub fn solve(
     let failure = follow(scene, &mut newton, &mut recorder, timer, watcher)?;
 
     let summary = summarise(scene, discrete, newton.steps(), &failure, std::mem::take(&mut recorder.rows), comm);
+    let distances = scene.solver.error.map(|_| {
+        timer.time("error estimate", || {
+            let problem = newton.problem();
+            bregman::distances(problem.sums, &problem.regions(), &newton.iterate().u)
+        })
+    });
+    let squares =
+        |errors: &newton::errors::Errors| errors.elements.iter().map(|of| of.iter().map(|e| e * e).collect()).collect();
+    let stress_parts = newton.iterate().errors.as_ref().filter(|_| distances.is_some()).map(squares);
     let (problem, u) = newton.finish();
     let meshes = restart::meshes::meshes(comm, scene, discrete);
     let mesh_names = serde_json::to_string(&meshes).expect("names and numbers can be written");
@@ -131,7 +148,7 @@ pub fn solve(
         state: restart::state::pack(&problem, meshes),
     };
     let Recorder { piece, closed, .. } = recorder;
-    Ok(Solved { summary, piece, records, u, closed, histories: problem.committed.histories })
+    Ok(Solved { summary, piece, records, u, closed, distances, stress_parts, histories: problem.committed.histories })
 }
 
 /// What Newton begins with; the problem takes what an earlier run committed, the recorder what was recorded before.
@@ -142,6 +159,12 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
             // Without a history the right-hand sides at its beginning are those of its end.
             problem.make_admissible(&mut start.u);
             newton::Begin::Near(start)
+        }
+        Begin::Around(mut u) => {
+            problem.make_admissible(&mut u);
+            let largest = problem.space.maximum(newton::residuals::largest_displacement(&u));
+            let kept = problem.constraints.laws().kept_at(&problem.slack(&u), ROUNDING * largest);
+            newton::Begin::Near(newton::Start { u, kept })
         }
         Begin::After(Earlier { committed, u }) => {
             let closed = ROUNDING * committed.sizes.displacement;

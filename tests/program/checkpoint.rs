@@ -27,12 +27,12 @@ pub fn resume(ranks: usize, file: &Path) -> End {
     resume_with(ranks, file, &[])
 }
 
-fn resume_with(ranks: usize, file: &Path, more: &[&str]) -> End {
+pub fn resume_with(ranks: usize, file: &Path, more: &[&str]) -> End {
     run_disturbed(ranks, &[&["resume", file.to_str().unwrap(), "--progress", "off"], more].concat(), |_| ())
 }
 
 /// A run stopped after so many Newton steps: no run does less than one. Where its checkpoint is.
-fn stopped_after(steps: usize, out: &Path, sets: &[&str]) -> PathBuf {
+pub fn stopped_after(steps: usize, out: &Path, sets: &[&str]) -> PathBuf {
     const AT_ONCE: [&str; 2] = ["--time-limit", "0.000001"];
     let file = checkpoint(out);
     for step in 0..steps {

@@ -25,6 +25,7 @@ mod memory;
 mod mortar;
 mod patch;
 mod ranks;
+mod refined;
 mod results;
 mod rigid;
 mod ring;

@@ -57,6 +57,12 @@ impl<'a> Counted<'a> {
         scene.body.values().any(|body| body.gmsh().is_some()).then(|| Self::of_shapes(scene, bodies.to_vec(), shapes))
     }
 
+    /// The same for meshes whatever the scene's are.
+    pub fn of_meshes(scene: &'a Scene, bodies: &[BodyMesh]) -> Self {
+        let shape = |(body, mesh): (&'a Body, &BodyMesh)| Structured::of_mesh(body, mesh.counts());
+        Self::of_shapes(scene, bodies.to_vec(), scene.body.values().zip(bodies).map(shape).collect())
+    }
+
     fn of_shapes(scene: &'a Scene, bodies: Vec<BodyMesh>, shapes: Vec<Structured<'a>>) -> Self {
         let cut = cut(&scene.decomposition.method, &bodies);
         Self { scene, bodies, shapes, cut }

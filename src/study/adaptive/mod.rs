@@ -1,0 +1,133 @@
+//! Meshes as fine as an error asks for.
+//!
+//! A scene begins on few elements ([`start`]). When it is solved there, the [`error`] is estimated; [`marking`] names the elements
+//! that have most of it, these are bisected ([`crate::mesh::bisection`]), and the displacement passes to the finer meshes. What was bisected
+//! is kept: a run that goes on makes the same meshes from the first ones again.
+
+pub mod error;
+pub mod marking;
+pub mod start;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashSet;
+
+use super::cascade::{displacements, fetch};
+use crate::comm::Comm;
+use crate::comm::words::share;
+use crate::decomposition::BodyMesh;
+use crate::feti::Torn;
+use crate::mesh::bisection::Refinable;
+use crate::model::Discrete;
+use crate::model::meshes::{MeshError, Meshes, mapped};
+use crate::results::checkpoint::Checkpoint;
+use crate::results::piece::Field;
+use crate::scene::{self, Scene};
+
+/// Elements to be bisected, body by body: their corners within the body (ascending), and how often.
+pub type Wanted = Vec<Vec<(Vec<u32>, usize)>>;
+
+/// The meshes of all bodies.
+#[derive(Clone)]
+pub struct Adaptive {
+    bodies: Vec<Refinable>,
+    /// What this rank named for each refinement.
+    past: Vec<Wanted>,
+}
+
+impl Adaptive {
+    /// The first meshes of a scene of tetrahedra, none of which is a brick, and what the user should know of them. Collective.
+    ///
+    /// # Errors
+    /// If there are none.
+    pub fn new(scene: &Scene, comm: &dyn Comm) -> Result<(Self, Vec<String>), MeshError> {
+        let Meshes { solids, warnings, .. } = Meshes::new(scene, comm)?;
+        let of = |(body, mesh): (&scene::Body, _)| Refinable::new(comm, mesh, mapped(&body.shape));
+        let bodies = scene.body.values().zip(solids.values()).map(of).collect();
+        Ok((Self { bodies, past: Vec::new() }, warnings))
+    }
+
+    /// This rank's parts of the meshes.
+    pub fn meshes(&self, scene: &Scene) -> Meshes {
+        Meshes::of(scene, self.bodies.iter().map(Refinable::mesh).enumerate().collect())
+    }
+
+    /// Unknowns: three a node.
+    pub fn unknowns(&self) -> u64 {
+        3 * self.bodies.iter().map(|mesh| mesh.counts().nodes).sum::<u64>()
+    }
+
+    /// Bisects elements; nodes take a displacement with them, which is of the meshes of `discrete`. Collective.
+    pub fn refine(&mut self, comm: &dyn Comm, (discrete, u): (&Discrete, &Torn), wanted: Wanted) {
+        let needed =
+            |(mesh, body): (&Refinable, &BodyMesh)| mesh.nodes().map(|node| global(body, node)).collect::<Vec<_>>();
+        let needed: HashSet<u64> = self.bodies.iter().zip(&discrete.bodies).flat_map(needed).collect();
+        let known = fetch(comm, displacements(&discrete.decomposition.subdomains, u), needed);
+        for (mesh, body) in self.bodies.iter_mut().zip(&discrete.bodies) {
+            mesh.displace(|node| known[&global(body, node)]);
+        }
+        self.bisect(comm, wanted);
+    }
+
+    fn bisect(&mut self, comm: &dyn Comm, wanted: Wanted) {
+        self.bodies.iter_mut().zip(&wanted).for_each(|(mesh, wanted)| mesh.refine(comm, wanted));
+        self.past.push(wanted);
+    }
+
+    /// The displacement that the nodes have, torn. Collective.
+    pub fn displacement(&self, comm: &dyn Comm, discrete: &Discrete) -> Torn {
+        let subdomains = &discrete.decomposition.subdomains;
+        let needed = subdomains.iter().flat_map(|s| s.nodes.iter().copied()).collect();
+        let known = self.bodies.iter().zip(&discrete.bodies);
+        let known = known.flat_map(|(mesh, body)| mesh.nodes().map(|node| (global(body, node), mesh.at(node)[1])));
+        let known = fetch(comm, known, needed);
+        subdomains.iter().map(|s| s.nodes.iter().flat_map(|node| known[node]).collect()).collect()
+    }
+
+    /// What was bisected so far, as arrays of a checkpoint.
+    pub fn arrays(&self) -> Vec<Field> {
+        let row = |(corners, times): &(Vec<u32>, usize)| {
+            corners.iter().map(|&corner| i64::from(corner)).chain([*times as i64]).collect::<Vec<_>>()
+        };
+        let field = |refinement: usize, body: usize, of: &Vec<(Vec<u32>, usize)>| Field {
+            components: ROW,
+            ..Field::integer(&path(refinement, body), of.iter().flat_map(row).collect())
+        };
+        let of_refinement = |(refinement, wanted): (usize, &Wanted)| {
+            wanted.iter().enumerate().map(|(body, of)| field(refinement, body, of)).collect::<Vec<_>>()
+        };
+        self.past.iter().enumerate().flat_map(of_refinement).collect()
+    }
+
+    /// Refines the first meshes as often as a checkpoint says. Collective.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn repeat(&mut self, comm: &dyn Comm, checkpoint: &Checkpoint, refinements: usize) -> Result<(), String> {
+        for refinement in 0..refinements {
+            let of_body = |body: usize| {
+                let path = path(refinement, body);
+                let own = share(checkpoint.arrays().count(&path)?, comm);
+                let rows: Vec<i64> = checkpoint.arrays().read(&path, own.start, own.end - own.start)?;
+                let row =
+                    |row: &[i64]| (row[..ROW - 1].iter().map(|&corner| corner as u32).collect(), row[ROW - 1] as usize);
+                Ok(rows.chunks_exact(ROW).map(row).collect())
+            };
+            let wanted = (0..self.bodies.len()).map(of_body).collect::<Result<_, String>>()?;
+            self.bisect(comm, wanted);
+        }
+        Ok(())
+    }
+}
+
+/// Numbers of a bisected element in a checkpoint: its corners, and how often.
+const ROW: usize = 5;
+
+fn path(refinement: usize, body: usize) -> String {
+    format!("refined/{refinement}-{body}")
+}
+
+/// The number of a node among those of all bodies.
+fn global(body: &BodyMesh, node: u32) -> u64 {
+    body.first_node + u64::from(node)
+}

@@ -1,0 +1,100 @@
+//! Meshes are refined until the error is as small as the user asks for.
+
+use crate::checkpoint::{assert_same_result, resume_with, stopped_after};
+use crate::common::{assert_refused, assert_scene_refused, number, only_result, run_briefly, run_misused, solve_with};
+use serde_json::Value;
+
+/// Of two-blocks, from two families of adaptive meshes of another program.
+const LEAST_ENERGY: f64 = -1.4876e9;
+
+fn rows(summary: &Value) -> &Vec<Value> {
+    summary["refinements"].as_array().unwrap()
+}
+
+/// The true error of the energy on each mesh falls, and the last is near the one that was asked for, not above it.
+#[test]
+fn the_error_is_what_was_asked_for() {
+    let summary = solve_with(2, "two-blocks", 1, &[], &["--error", "2%"]).converged().summary();
+    let errors: Vec<f64> = rows(&summary).iter().map(|row| number(row, "energy") / LEAST_ENERGY - 1.0).collect();
+    assert!(errors.len() > 3 && errors.windows(2).all(|pair| pair[1].abs() < pair[0].abs()), "{errors:?}");
+    let last = errors.last().unwrap().abs();
+    assert!((0.4..1.0).contains(&(last / 0.02)), "{last}");
+    let row = rows(&summary).last().unwrap();
+    assert!(number(row, "error") <= 0.02 && number(row, "unknowns") < 40_000.0);
+    assert_eq!(row["energy"], summary["energy"]);
+    assert_eq!(row["elements"], summary["elements"]);
+}
+
+#[test]
+fn ranks_change_no_bit_of_it() {
+    let of = |ranks| {
+        let run = solve_with(ranks, "two-blocks", 1, &[], &["--error", "0.06"]).converged();
+        only_result(run.summary())
+    };
+    let alone = of(1);
+    assert!(alone["refinements"].as_array().unwrap().len() > 2);
+    assert!([2, 3, 5].into_iter().all(|ranks| of(ranks) == alone));
+}
+
+/// Stopped on the first, the second and the third mesh.
+#[test]
+fn it_goes_on_from_a_checkpoint_on_any_mesh() {
+    let directory = tempfile::tempdir().unwrap();
+    let (whole, out) = (directory.path().join("whole"), directory.path().join("stopped"));
+    let arguments = |out: &std::path::Path| {
+        ["solve", "two-blocks", "--progress", "off", "--set", "solver.error=0.06", "--out", out.to_str().unwrap()]
+            .map(String::from)
+    };
+    let whole_run = arguments(&whole);
+    let run = run_briefly(1, &whole_run.each_ref().map(|s| &s[..]));
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    for (steps, ranks) in [(1, 2), (5, 3), (7, 1)] {
+        let file = stopped_after(steps, &out, &["solver.error=0.06"]);
+        let end = resume_with(ranks, &file, &[]);
+        assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+        assert_same_result(&out, &whole, "two-blocks");
+    }
+}
+
+/// The result on the largest mesh that is allowed is written, with its error.
+#[test]
+fn a_limit_of_unknowns_ends_it_with_the_best_result() {
+    let run = solve_with(2, "two-blocks", 1, &[], &["--error", "1%", "--max-unknowns", "12000"]);
+    assert_eq!(run.code, 1);
+    assert!(run.result().exists());
+    let summary = run.summary();
+    let text = summary["error"].as_str().unwrap();
+    assert!(text.contains("not 1.00 %") && text.contains("solver.max_unknowns is 12000"), "{text}");
+    let row = rows(&summary).last().unwrap();
+    assert!(number(row, "unknowns") > 6000.0 && number(row, "unknowns") <= 12000.0);
+}
+
+/// Errors of stresses, with linear tetrahedra that the user chose.
+#[test]
+fn the_stress_and_the_element_may_be_chosen() {
+    let sets = ["body.lower.element=tet4", "body.upper.element=tet4", "load.top.traction=[0.0, 0.0, -20.0]"];
+    let run = solve_with(2, "two-blocks", 1, &sets, &["--error", "30%", "--error-of", "stress"]).converged();
+    assert!(!run.stdout.contains("tet10 in place"), "{}", run.stdout);
+    let summary = run.summary();
+    let last = rows(&summary).last().unwrap();
+    assert!(number(last, "error") <= 0.3 && number(last, "stress") <= 0.3 && rows(&summary).len() > 1);
+}
+
+/// What is decided in place of the scene is told.
+#[test]
+fn the_choice_of_elements_is_told() {
+    let run = solve_with(1, "two-blocks", 1, &["body.upper.element=tet4"], &["--error", "10%"]).converged();
+    assert!(run.stdout.contains("body lower: tet10 in place of tet4"), "{}", run.stdout);
+    assert!(!run.stdout.contains("body upper: tet10"), "{}", run.stdout);
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    for bad in ["0", "1", "-1%", "150%", "much", "nan"] {
+        let run = run_misused(1, &["solve", "two-blocks", "--error", bad]);
+        assert_eq!(run.code, 64, "{bad}");
+    }
+    assert_scene_refused("two-blocks", &["solver.error=2"], 65, &["solver.error = 2", "above 0 and below 1"]);
+    let run = solve_with(2, "two-blocks", 1, &["body.upper.element=hex8"], &["--error", "1%"]);
+    assert_refused(&run, 65, &["body.upper.element = \"hex8\"", "only tet4 and tet10"]);
+}
