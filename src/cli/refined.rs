@@ -40,10 +40,10 @@ impl Run<'_> {
         let (comm, timer) = (self.comm, self.timer);
         let is_chosen =
             |name: &str| plan.source.sets.iter().any(|set| set.trim().starts_with(&format!("body.{name}.element")));
-        let (scene, notes) = start(scene, is_chosen).map_err(Failure::Scene)?;
-        let scene = &scene;
-        notes.into_iter().for_each(|note| monitor.event(&Event::Note(note)));
-        let made = timer.time("discretisation", || Adaptive::new(scene, comm)).map_err(ModelError::from);
+        let start = start(scene, is_chosen).map_err(Failure::Scene)?;
+        let scene = &start.scene;
+        start.notes.iter().for_each(|note| monitor.event(&Event::Note(note.clone())));
+        let made = timer.time("discretisation", || Adaptive::new(&start, comm)).map_err(ModelError::from);
         let (mut adaptive, of_meshes) = made?;
         if let Some(file) = &checkpoint {
             let unreadable = |reason| unfit(Unfit::Unreadable(reason));

@@ -132,13 +132,20 @@ impl Cell {
             for (node, &corner) in nodes.iter_mut().zip(&half.corners) {
                 *node = if corner == MIDDLE { middle } else { self.nodes[corner] };
             }
-            if !kind.middles().is_empty() {
-                EDGES.iter().enumerate().for_each(|(k, &(a, b))| nodes[4 + k] = middles[&edge(nodes[a], nodes[b])]);
-            }
             let on = half.within.map(|face| face.map_or(0, |face| self.on[face]));
-            Self { nodes, on, tag: half.tag, due: self.due.saturating_sub(1), ..*self }
+            let mut half = Self { nodes, on, tag: half.tag, due: self.due.saturating_sub(1), ..*self };
+            if !kind.middles().is_empty() {
+                half.raise(middles);
+            }
+            half
         });
         [first, Self { number, ..second }]
+    }
+
+    /// Takes the nodes in the middle of its edges.
+    pub fn raise(&mut self, middles: &HashMap<Edge, u32>) {
+        let of_edges = self.edges().map(|edge| middles[&edge]);
+        self.nodes[4..].copy_from_slice(&of_edges);
     }
 
     /// Appends it with all that is known at its nodes.

@@ -50,11 +50,12 @@ pub struct Refinable {
 }
 
 impl Refinable {
-    /// Of a mesh of tetrahedra that nothing was displaced of yet. Collective.
+    /// Of a mesh of tetrahedra that nothing was displaced of yet, as elements of a kind: linear ones become straight quadratic ones
+    /// where these are wanted. Collective.
     ///
     /// # Panics
     /// If it has other elements.
-    pub fn new(comm: &dyn Comm, mesh: &SolidMesh, form: Option<Mapped>) -> Self {
+    pub fn new(comm: &dyn Comm, mesh: &SolidMesh, form: Option<Mapped>, kind: Kind) -> Self {
         let portion = &mesh.portion;
         let mut on: HashMap<Vec<u32>, Vec<u64>> = HashMap::new();
         for (k, surface) in (0..).zip(&mesh.surfaces) {
@@ -83,8 +84,8 @@ impl Refinable {
         };
         let cells = (0..portion.len()).map(|at| Cell::new(portion, mesh.pieces[at], at, &of_face)).collect();
         let at_nodes = portion.points.iter().map(|&place| [place, [0.0; 3]]);
-        Self {
-            kind: portion.elements.kind(),
+        let mut refinable = Self {
+            kind,
             cells,
             nodes: portion.nodes.iter().copied().zip(at_nodes).collect(),
             counts: mesh.counts,
@@ -92,7 +93,26 @@ impl Refinable {
             surfaces: mesh.surfaces.iter().map(|surface| surface.name.clone()).collect(),
             sets,
             form,
+        };
+        if kind.degree() > portion.elements.kind().degree() {
+            refinable.raise(comm);
         }
+        refinable
+    }
+
+    /// Puts nodes in the middle of all edges. Collective.
+    fn raise(&mut self, comm: &dyn Comm) {
+        let edges: BTreeSet<Edge> = self.cells.iter().flat_map(Cell::edges).collect();
+        let keys: Vec<[u64; 2]> = edges.iter().map(|edge| edge.map(u64::from)).collect();
+        let mut register = Register::new(self.counts.nodes);
+        let middles: HashMap<Edge, u32> = edges.into_iter().zip(register.numbers(comm, &keys)).collect();
+        self.counts.nodes = register.count();
+        for (&edge, &node) in &middles {
+            let [a, b] = edge.map(|end| self.nodes[&end][0]);
+            let middle = std::array::from_fn(|axis| 0.5 * a[axis] + 0.5 * b[axis]);
+            self.nodes.insert(node, [self.on_form(edge, middle), [0.0; 3]]);
+        }
+        self.cells.iter_mut().for_each(|cell| cell.raise(&middles));
     }
 
     /// Numbers within the body of the nodes that this rank has.

@@ -97,7 +97,7 @@ fn random_refinements_of_random_meshes_are_sound_and_keep_their_shape() {
         let start = random_mesh(&mut random, kind);
         let (volume, areas) = sizes(&start);
         let first = worst(&start);
-        let mut mesh = Refinable::new(&Solo, &start, None);
+        let mut mesh = Refinable::new(&Solo, &start, None, kind);
         for _ in 0..4 {
             let (share, times) = (0.05 + 0.1 * (1.0 + random.number()), 1 + (1.0 + random.number()) as usize);
             let wanted = some(&mut random, &mesh.mesh(), share, times);
@@ -117,7 +117,7 @@ fn a_refined_mesh_is_the_same_on_any_ranks() {
         let body = Mapped::Sphere { radii: [1.0, 2.0], cells: [2, 2] };
         let refined = |comm: &dyn Comm| {
             let mut random = Random::new(2);
-            let mut mesh = Refinable::new(comm, &body.mesh(comm, kind), Some(body.clone()));
+            let mut mesh = Refinable::new(comm, &body.mesh(comm, kind), Some(body.clone()), kind);
             for times in [1, 3, 2] {
                 // Any rank may name an element: here rank 0 names those near a corner, or all.
                 let wanted = some(&mut random, &mesh.mesh(), 1.0, times).into_iter();
@@ -170,7 +170,7 @@ fn displacements_are_passed_on_exactly() {
         let of = |x: [f64; 3]| {
             [x[0] - 2.0 * x[2], quadratic * x[0] * x[1] + x[1], quadratic * (x[2] * x[2] - x[0] * x[2]) + 3.0]
         };
-        let mut mesh = Refinable::new(&Solo, &start, None);
+        let mut mesh = Refinable::new(&Solo, &start, None, kind);
         let places: HashMap<u32, [f64; 3]> =
             start.portion.nodes.iter().copied().zip(start.portion.points.clone()).collect();
         mesh.displace(|node| of(places[&node]));
@@ -197,10 +197,10 @@ fn curved_elements_are_refined_on_their_surface() {
         let start = body.mesh(&Solo, kind);
         let volume = sizes(&start).0;
         let all = |mesh: &SolidMesh| some(&mut Random::new(1), mesh, 1.0, 3);
-        let mut blind = Refinable::new(&Solo, &start, None);
+        let mut blind = Refinable::new(&Solo, &start, None, kind);
         blind.refine(&Solo, &all(&start));
         assert!((sizes(&blind.mesh()).0 / volume - 1.0).abs() < 1e-12);
-        let mut mesh = Refinable::new(&Solo, &start, Some(body.clone()));
+        let mut mesh = Refinable::new(&Solo, &start, Some(body.clone()), kind);
         let mut errors = vec![(volume - exact).abs()];
         for _ in 0..2 {
             let wanted = all(&mesh.mesh());
@@ -218,5 +218,40 @@ fn curved_elements_are_refined_on_their_surface() {
         // Halved cells: second order for facets, fourth for patches; the first mesh is one cell across.
         let least = if kind == Kind::Tet10 { 12.0 } else { 3.4 };
         assert!(errors.windows(2).all(|e| e[0] / e[1] > least), "{kind:?} {errors:?}");
+    }
+}
+
+/// A linear mesh that becomes quadratic is the one with straight edges, on any ranks, and on a sphere that is known the curved one.
+#[test]
+fn linear_meshes_become_quadratic() {
+    let planes = [vec![0.0, 1.0, 3.0], vec![0.0, 2.0], vec![0.0, 1.0]];
+    for (body, form) in [
+        (Mapped::Grid { planes }, None),
+        (
+            Mapped::Sphere { radii: [1.0, 2.0], cells: [2, 1] },
+            Some(Mapped::Sphere { radii: [1.0, 2.0], cells: [2, 1] }),
+        ),
+    ] {
+        let places = |comm: &dyn Comm| {
+            let raised = Refinable::new(comm, &body.mesh(comm, Kind::Tet4), form.clone(), Kind::Tet10);
+            let mesh = raised.mesh();
+            assert!(Quality::of(comm, &mesh.portion).is_sound());
+            (mesh.counts, mesh.portion.nodes.iter().map(|&node| (node, *raised.at(node))).collect::<Vec<_>>())
+        };
+        let (counts, alone) = places(&Solo);
+        let quadratic = body.mesh(&Solo, Kind::Tet10);
+        assert_eq!((counts.nodes, counts.elements), (quadratic.counts.nodes, quadratic.counts.elements));
+        if form.is_none() {
+            let sorted = |points: Vec<[f64; 3]>| {
+                let mut bits: Vec<[u64; 3]> = points.into_iter().map(|x| x.map(f64::to_bits)).collect();
+                bits.sort_unstable();
+                bits
+            };
+            assert_eq!(sorted(alone.iter().map(|(_, at)| at[0]).collect()), sorted(quadratic.portion.points));
+        }
+        let mut parts: Vec<(u32, AtNode)> = threads::run(3, |comm| places(comm).1).concat();
+        parts.sort_by_key(|(node, _)| *node);
+        parts.dedup();
+        assert_eq!(parts, alone);
     }
 }

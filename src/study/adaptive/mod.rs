@@ -12,6 +12,7 @@ mod tests;
 
 use std::collections::HashSet;
 
+use self::start::Start;
 use super::cascade::{displacements, fetch};
 use crate::comm::Comm;
 use crate::comm::words::share;
@@ -36,13 +37,13 @@ pub struct Adaptive {
 }
 
 impl Adaptive {
-    /// The first meshes of a scene of tetrahedra, none of which is a brick, and what the user should know of them. Collective.
+    /// The first meshes, and what the user should know of them. Collective.
     ///
     /// # Errors
     /// If there are none.
-    pub fn new(scene: &Scene, comm: &dyn Comm) -> Result<(Self, Vec<String>), MeshError> {
-        let Meshes { solids, warnings, .. } = Meshes::new(scene, comm)?;
-        let of = |(body, mesh): (&scene::Body, _)| Refinable::new(comm, mesh, mapped(&body.shape));
+    pub fn new(Start { scene, read, .. }: &Start, comm: &dyn Comm) -> Result<(Self, Vec<String>), MeshError> {
+        let Meshes { solids, warnings, .. } = Meshes::new(read, comm)?;
+        let of = |(body, mesh): (&scene::Body, _)| Refinable::new(comm, mesh, mapped(&body.shape), body.element);
         let bodies = scene.body.values().zip(solids.values()).map(of).collect();
         Ok((Self { bodies, past: Vec::new() }, warnings))
     }

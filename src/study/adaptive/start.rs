@@ -1,7 +1,7 @@
 //! The scene of the first meshes: as few elements as tell what the bodies are.
 //!
 //! Bricks are cut into cells of nearly equal edges, [`ACROSS`] of them across the thinnest brick, but no more than the scene has. Other
-//! structured bodies and meshes from files are taken as they are. Elements become quadratic tetrahedra: for the same error they take
+//! structured bodies and meshes from files are taken as they are; straight elements of a file stay straight, however they are refined. Elements become quadratic tetrahedra: for the same error they take
 //! a fraction of the unknowns of linear ones, which lock where the material flows.
 
 use crate::element::Cell;
@@ -13,18 +13,29 @@ const ACROSS: f64 = 3.0;
 /// The algebraic error of a solution is at most this share of the discretisation error.
 const ACCURACY: f64 = 0.3;
 
-/// The scene to begin with, and what was decided. `is_chosen` says whether the user chose the element of a body.
+/// What a run that refines meshes begins with.
+pub struct Start {
+    /// The scene with the elements that are solved with; none of its bodies is a brick.
+    pub scene: Scene,
+    /// The same with the elements that its mesh files have: linear ones become quadratic when they are read.
+    pub read: Scene,
+    /// What was decided, in words.
+    pub notes: Vec<String>,
+}
+
+/// From a scene. `is_chosen` says whether the user chose the element of a body.
 ///
 /// # Errors
 /// Why the scene cannot be refined.
-pub fn start(scene: &Scene, is_chosen: impl Fn(&str) -> bool) -> Result<(Scene, Vec<String>), String> {
+pub fn start(scene: &Scene, is_chosen: impl Fn(&str) -> bool) -> Result<Start, String> {
     if scene.initial.is_some() {
         return Err(
             "solver.error: the state of `initial` belongs to one mesh, which cannot be refined; remove one of both"
                 .into(),
         );
     }
-    let mut scene = scene.clone();
+    let given = scene;
+    let mut scene = given.clone();
     let mut notes = Vec::new();
     let edges = scene.body.values().filter_map(|body| body.brick()).flat_map(|brick| brick.size);
     let edge = edges.fold(f64::INFINITY, f64::min) / ACROSS;
@@ -59,11 +70,20 @@ pub fn start(scene: &Scene, is_chosen: impl Fn(&str) -> bool) -> Result<(Scene, 
         scene.decomposition.method = Method::Auto;
     }
     scene.solver.accuracy.get_or_insert(ACCURACY);
-    Ok((scene, notes))
+    let mut read = scene.clone();
+    for (body, given) in read.body.values_mut().zip(given.body.values()).filter(|(_, given)| given.gmsh().is_some()) {
+        // Cells that are no tetrahedra are split into linear ones.
+        body.element = if given.element.cell() == Cell::Tetrahedron { given.element } else { linear() };
+    }
+    Ok(Start { scene, read, notes })
 }
 
 fn tetrahedra() -> impl Iterator<Item = Kind> {
     Kind::ALL.iter().copied().filter(|kind| kind.cell() == Cell::Tetrahedron)
+}
+
+fn linear() -> Kind {
+    tetrahedra().min_by_key(|kind| kind.degree()).expect("there are tetrahedra")
 }
 
 fn quadratic() -> Kind {

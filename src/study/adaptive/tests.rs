@@ -18,14 +18,15 @@ fn parts(discrete: &Discrete) -> Vec<Vec<f64>> {
 
 #[test]
 fn meshes_and_displacements_are_the_same_on_any_ranks_and_again() {
-    let (scene, _) = start(&two_bricks(&["decomposition.subdomains=6"]), |_| false).unwrap();
+    let start = start(&two_bricks(&["decomposition.subdomains=6"]), |_| false).unwrap();
+    let scene = &start.scene;
     let found = RANKS.map(|ranks| {
         let of_ranks = threads::run(ranks, |comm| {
-            let (mut adaptive, _) = Adaptive::new(&scene, comm).unwrap();
+            let (mut adaptive, _) = Adaptive::new(&start, comm).unwrap();
             let begin = adaptive.unknowns();
             let mut torn = Vec::new();
             for _ in 0..2 {
-                let discrete = model::discretise_meshes(&scene, adaptive.meshes(&scene), None, comm).unwrap();
+                let discrete = model::discretise_meshes(scene, adaptive.meshes(scene), None, comm).unwrap();
                 let u = discrete
                     .decomposition
                     .subdomains
@@ -34,7 +35,7 @@ fn meshes_and_displacements_are_the_same_on_any_ranks_and_again() {
                     .collect();
                 let wanted = wanted(comm, &discrete, &parts(&discrete), 0.5);
                 adaptive.refine(comm, (&discrete, &u), wanted);
-                let discrete = model::discretise_meshes(&scene, adaptive.meshes(&scene), None, comm).unwrap();
+                let discrete = model::discretise_meshes(scene, adaptive.meshes(scene), None, comm).unwrap();
                 torn = adaptive.displacement(comm, &discrete);
                 for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(&torn) {
                     for (x, u) in subdomain.points.iter().zip(u.as_chunks::<3>().0) {
@@ -53,7 +54,7 @@ fn meshes_and_displacements_are_the_same_on_any_ranks_and_again() {
 
 #[test]
 fn what_is_marked_leaves_the_share_as_far_as_can_be_foretold() {
-    let (scene, _) = start(&two_bricks(&[]), |_| false).unwrap();
+    let Start { scene, .. } = start(&two_bricks(&[]), |_| false).unwrap();
     let comm = &crate::comm::solo::Solo;
     let discrete = model::discretise(&scene, comm).unwrap();
     let parts = parts(&discrete);
@@ -73,14 +74,14 @@ fn what_is_marked_leaves_the_share_as_far_as_can_be_foretold() {
 #[test]
 fn a_scene_begins_on_few_quadratic_tetrahedra() {
     let scene = two_bricks(&[]);
-    let (begun, notes) = start(&scene, |_| false).unwrap();
+    let Start { scene: begun, notes, .. } = start(&scene, |_| false).unwrap();
     assert!(begun.body.values().all(|body| body.element == Kind::Tet10 && body.brick().is_none()));
     assert_eq!(begun.decomposition.method, Method::Auto);
     assert!(notes.iter().any(|note| note.contains("lower: begins with 4 x 2 x 2 cells")), "{notes:?}");
     assert!(notes.iter().any(|note| note.contains("tet10 in place of tet4")));
-    let (kept, _) = start(&scene, |name| name == "lower").unwrap();
+    let Start { scene: kept, .. } = start(&scene, |name| name == "lower").unwrap();
     assert_eq!(kept.body.values().map(|body| body.element).collect::<Vec<_>>(), [Kind::Tet4, Kind::Tet10]);
     let hexahedra = two_bricks(&["body.lower.element=hex8"]);
-    assert!(start(&hexahedra, |_| true).unwrap_err().contains("only tet4 and tet10 can be refined"));
+    assert!(start(&hexahedra, |_| true).err().unwrap().contains("only tet4 and tet10 can be refined"));
     assert!(start(&hexahedra, |_| false).is_ok());
 }
