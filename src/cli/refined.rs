@@ -14,7 +14,7 @@ use crate::scene::{ErrorOf, Scene};
 use crate::sizing::counts::Counted;
 use crate::study::adaptive::error::{Known, estimate};
 use crate::study::adaptive::start::start;
-use crate::study::adaptive::{Adaptive, marking};
+use crate::study::adaptive::{Adaptive, marking, parts};
 use crate::study::{Begin, Solved};
 
 /// A mesh aims at this share of the error of the one before at least: further off the estimate is not to be trusted ...
@@ -61,7 +61,7 @@ impl Run<'_> {
             };
             let (discrete, mut solved) =
                 self.solve_problem(plan, scene, (discrete, adaptive.arrays()), begin, monitor)?;
-            plan.refinements.push(self.row(scene, &plan.refinements, &solved, adaptive.unknowns(), began));
+            plan.refinements.push(self.row(scene, &plan.refinements, (&discrete, &solved), adaptive.unknowns(), began));
             let row = plan.refinements.last().expect("it was pushed");
             let (found, goal) = (row.error, scene.solver.error.unwrap_or_default());
             monitor.event(&Event::Refinement { row: row.clone(), goal });
@@ -88,13 +88,13 @@ impl Run<'_> {
         &self,
         scene: &Scene,
         before: &[RefinementRow],
-        solved: &Solved,
+        (discrete, solved): (&Discrete, &Solved),
         unknowns: u64,
         began: f64,
     ) -> RefinementRow {
         let summary = &solved.summary;
         let (energy, errors) = (summary.state.energy.unwrap_or(f64::NAN), &summary.state.errors);
-        let distance = solved.distances.as_ref().map_or(f64::NAN, |parts| marking::total(self.comm, parts));
+        let distance = marking::total(self.comm, &parts(discrete, solved, ErrorOf::Energy));
         let gap = errors.duality_gap.unwrap_or(0.0);
         let stress = errors.discretisation.unwrap_or(f64::NAN);
         let of_row = |row: &RefinementRow| Known {
@@ -131,16 +131,16 @@ impl Run<'_> {
         }
         let row = plan.refinements.last().expect("a mesh was solved on");
         let share = scene.solver.error.map_or(1.0, |goal| AIM * goal / row.error).clamp(SHARE, SMALLER[2]);
-        // Squares of errors of the stress, as energies are.
-        let (parts, share) = match scene.solver.error_of {
-            ErrorOf::Energy => (solved.distances.as_ref(), share),
-            ErrorOf::Stress => (solved.stress_parts.as_ref(), share.max(SHARE.sqrt()).powi(2)),
+        let share = match scene.solver.error_of {
+            ErrorOf::Energy => share,
+            // Its parts are squares.
+            ErrorOf::Stress => share.max(SHARE.sqrt()).powi(2),
         };
-        let Some(parts) = parts else { return Err("it cannot be estimated".into()) };
+        let parts = parts(discrete, solved, scene.solver.error_of);
         let mut limit = String::new();
         for share in std::iter::once(share).chain(SMALLER.into_iter().filter(|&smaller| smaller > share)) {
             let mut finer = adaptive.clone();
-            finer.refine(self.comm, (discrete, &solved.u), marking::wanted(self.comm, discrete, parts, share));
+            finer.refine(self.comm, (discrete, &solved.u), marking::wanted(self.comm, discrete, &parts, share));
             if finer.unknowns() == adaptive.unknowns() {
                 return Err("no element has more of it than others".into());
             }

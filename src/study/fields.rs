@@ -7,7 +7,7 @@ use crate::feti::Torn;
 use crate::model::contacts::Contacts;
 use crate::newton::residuals::larger;
 use crate::newton::{Iterate, Newton, TornProblem};
-use crate::results::piece::{Field, Piece};
+use crate::results::piece::{Field, Piece, Values};
 
 /// Mesh of a rank's subdomains, one behind the other, with the fields that never change.
 pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
@@ -36,9 +36,14 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
     piece
 }
 
-/// Adds the iterate to the mesh, at the time of its increment; `contact` holds the pairs whose rows are on this rank. Returns the
-/// largest von Mises stress in this rank's elements.
-pub fn record(piece: &mut Piece, newton: &Newton, touching: &Contacts, contact: &[ContactState]) -> f64 {
+/// Adds the iterate to the mesh, at the time of its increment, with what may touch and the contact of the pairs whose rows are on this
+/// rank, and the Bregman distances of elements where these are known. Returns the largest von Mises stress in this rank's elements.
+pub fn record(
+    piece: &mut Piece,
+    newton: &Newton,
+    (touching, contact): (&Contacts, &[ContactState]),
+    distances: Option<Vec<Vec<f64>>>,
+) -> f64 {
     let (problem, Iterate { u, errors, .. }) = (newton.problem(), newton.iterate());
     let displacement: Vec<[f64; 3]> = u.iter().flat_map(|u| u.as_chunks::<3>().0).copied().collect();
     let (stress, plastic): (Vec<f64>, _) = element_states(problem, u).unzip();
@@ -49,13 +54,33 @@ pub fn record(piece: &mut Piece, newton: &Newton, touching: &Contacts, contact: 
         Some(errors) => errors.elements.concat(),
         None => vec![f64::NAN; piece.types.len()],
     };
-    let cell_data = vec![
+    let mut cell_data = vec![
         Field::scalar("von_mises", stress),
         Field::scalar("equivalent_plastic_strain", plastic),
-        Field::scalar("error_estimate", estimate),
+        Field::scalar(STRESS_ERROR, estimate),
     ];
+    cell_data.extend(distances.map(|distances| Field::scalar(ENERGY_ERROR, distances.concat())));
     piece.record(newton.at().time(), point_data, cell_data);
     largest
+}
+
+/// The field of each element's part in the error of the stress.
+pub const STRESS_ERROR: &str = "error_estimate";
+/// The field of Bregman distances.
+pub const ENERGY_ERROR: &str = "energy_error";
+
+/// The largest value of a field in each element of all increments that were recorded, subdomain by subdomain. None if there is no
+/// such field.
+pub fn largest(piece: &Piece, subdomains: &[Subdomain], name: &str) -> Vec<Vec<f64>> {
+    let states = piece.cell_data.iter().filter(|field| field.name == name).flat_map(|field| &field.states);
+    let mut largest: Vec<f64> = Vec::new();
+    for state in states.filter_map(Values::real) {
+        largest.resize(state.len(), 0.0);
+        // What is not a number is not larger.
+        largest.iter_mut().zip(state).for_each(|(largest, value)| *largest = largest.max(*value));
+    }
+    let mut rest = largest.into_iter();
+    subdomains.iter().map(|subdomain| rest.by_ref().take(subdomain.elements.len()).collect()).collect()
 }
 
 /// Von Mises stress and equivalent plastic strain of all elements, one increment from what is committed.

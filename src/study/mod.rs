@@ -24,7 +24,6 @@ use self::recorder::Recorder;
 use self::report::{convergence, loss_of_accuracy, newton_row, place, summarise};
 use crate::comm::Comm;
 use crate::decomposition::sums::NodeSums;
-use crate::estimate::bregman;
 use crate::feti::Torn;
 use crate::feti::dual::Interconnection;
 use crate::material::History;
@@ -95,10 +94,6 @@ pub struct Solved {
     pub u: Torn,
     /// Closed contact pairs whose rows are on this rank, by index.
     pub closed: Vec<u64>,
-    /// For each element of each of this rank's subdomains how far its energy is above the least, where a scene asks for an error.
-    pub distances: Option<Vec<Vec<f64>>>,
-    /// Likewise the part of each element in the square of the error of the stress, relative.
-    pub stress_parts: Option<Vec<Vec<f64>>>,
     /// What the integration points of each of this rank's subdomains remember; none where nothing ever yielded.
     pub histories: Vec<Vec<History>>,
 }
@@ -130,15 +125,6 @@ pub fn solve(
     let failure = follow(scene, &mut newton, &mut recorder, timer, watcher)?;
 
     let summary = summarise(scene, discrete, newton.steps(), &failure, std::mem::take(&mut recorder.rows), comm);
-    let distances = scene.solver.error.map(|_| {
-        timer.time("error estimate", || {
-            let problem = newton.problem();
-            bregman::distances(problem.sums, &problem.regions(), &newton.iterate().u)
-        })
-    });
-    let squares =
-        |errors: &newton::errors::Errors| errors.elements.iter().map(|of| of.iter().map(|e| e * e).collect()).collect();
-    let stress_parts = newton.iterate().errors.as_ref().filter(|_| distances.is_some()).map(squares);
     let (problem, u) = newton.finish();
     let meshes = restart::meshes::meshes(comm, scene, discrete);
     let mesh_names = serde_json::to_string(&meshes).expect("names and numbers can be written");
@@ -148,7 +134,7 @@ pub fn solve(
         state: restart::state::pack(&problem, meshes),
     };
     let Recorder { piece, closed, .. } = recorder;
-    Ok(Solved { summary, piece, records, u, closed, distances, stress_parts, histories: problem.committed.histories })
+    Ok(Solved { summary, piece, records, u, closed, histories: problem.committed.histories })
 }
 
 /// What Newton begins with; the problem takes what an earlier run committed, the recorder what was recorded before.
@@ -211,7 +197,7 @@ fn follow(
         }
         let outcome = newton.outcome().cloned();
         if outcome == Some(Outcome::Converged) {
-            timer.time("records", || recorder.record(newton));
+            recorder.record(newton, timer);
         }
         match newton.advance(timer) {
             Next::Increment => {}
@@ -224,7 +210,7 @@ fn follow(
                 let failure = outcome.filter(|outcome| *outcome != Outcome::Converged);
                 if failure.is_some() && newton.reached().is_none() {
                     // Nothing ever converged: what there is is better than nothing.
-                    timer.time("records", || recorder.record(newton));
+                    recorder.record(newton, timer);
                 }
                 return Ok(failure.map(|outcome| (at, outcome)));
             }

@@ -2,7 +2,9 @@
 
 use super::{fields, report};
 use crate::comm::Comm;
+use crate::estimate::bregman;
 use crate::model::Discrete;
+use crate::monitor::timing::Timer;
 use crate::newton::Newton;
 use crate::record::rows::StepRow;
 use crate::results::piece::Piece;
@@ -47,10 +49,19 @@ impl<'a> Recorder<'a> {
     }
 
     /// Takes down where an iteration ended. Collective.
-    pub fn record(&mut self, newton: &Newton) {
+    pub fn record(&mut self, newton: &Newton, timer: &Timer) {
+        // The potential is that of the step, so its distances are measured before the step is committed.
+        let distances = self.scene.solver.error.map(|_| {
+            let (problem, u) = (newton.problem(), &newton.iterate().u);
+            timer.time("error estimate", || bregman::distances(problem.sums, &problem.regions(), u))
+        });
+        timer.time("records", || self.record_results(newton, distances));
+    }
+
+    fn record_results(&mut self, newton: &Newton, distances: Option<Vec<Vec<f64>>>) {
         let Self { scene, discrete, comm, .. } = *self;
         let contact = report::contact_states(newton.problem(), newton.iterate());
-        let von_mises = fields::record(&mut self.piece, newton, &discrete.contacts, &contact);
+        let von_mises = fields::record(&mut self.piece, newton, (&discrete.contacts, &contact), distances);
         self.rows.push(report::step_row(comm, scene, discrete, newton, &contact, von_mises));
         self.closed = contact.iter().filter(|state| state.status.is_closed()).map(|state| state.pair as u64).collect();
     }

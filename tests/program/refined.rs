@@ -98,3 +98,19 @@ fn what_makes_no_sense_is_refused() {
     let run = solve_with(2, "two-blocks", 1, &["body.upper.element=hex8"], &["--error", "1%"]);
     assert_refused(&run, 65, &["body.upper.element = \"hex8\"", "only tet4 and tet10"]);
 }
+
+/// A history is refined where any of its increments has much of the error; it goes on from a checkpoint in its second increment.
+#[test]
+fn histories_are_solved_on_each_mesh() {
+    let directory = tempfile::tempdir().unwrap();
+    let (whole, out) = (directory.path().join("whole"), directory.path().join("stopped"));
+    let sets = ["solver.error=0.2", "step=[{increments=2}, {amplitude=0.2}]"];
+    let mut arguments = vec!["solve", "two-blocks", "--progress", "off", "--out", whole.to_str().unwrap()];
+    arguments.extend(sets.iter().flat_map(|set| ["--set", *set]));
+    let run = run_briefly(1, &arguments);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let file = stopped_after(8, &out, &sets);
+    let end = resume_with(2, &file, &[]);
+    assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+    assert_same_result(&out, &whole, "two-blocks");
+}

@@ -14,6 +14,7 @@ use std::collections::HashSet;
 
 use self::start::Start;
 use super::cascade::{displacements, fetch};
+use super::{Solved, fields};
 use crate::comm::Comm;
 use crate::comm::words::share;
 use crate::decomposition::BodyMesh;
@@ -23,7 +24,7 @@ use crate::model::Discrete;
 use crate::model::meshes::{MeshError, Meshes, mapped};
 use crate::results::checkpoint::Checkpoint;
 use crate::results::piece::Field;
-use crate::scene::{self, Scene};
+use crate::scene::{self, ErrorOf, Scene};
 
 /// Elements to be bisected, body by body: their corners within the body (ascending), and how often.
 pub type Wanted = Vec<Vec<(Vec<u32>, usize)>>;
@@ -118,6 +119,18 @@ impl Adaptive {
             self.bisect(comm, wanted);
         }
         Ok(())
+    }
+}
+
+/// What each element of each of this rank's subdomains has of the error: an energy, or a square; the largest of all increments.
+pub fn parts(discrete: &Discrete, solved: &Solved, of: ErrorOf) -> Vec<Vec<f64>> {
+    let largest = |name| fields::largest(&solved.piece, &discrete.decomposition.subdomains, name);
+    match of {
+        ErrorOf::Energy => largest(fields::ENERGY_ERROR),
+        ErrorOf::Stress => {
+            let squares = |parts: Vec<f64>| parts.into_iter().map(|part| part * part).collect();
+            largest(fields::STRESS_ERROR).into_iter().map(squares).collect()
+        }
     }
 }
 
