@@ -36,7 +36,7 @@ use crate::monitor::timing::peak_rss_mb;
 use crate::record::summary::Summary;
 use crate::restart::state::NoStart;
 use crate::results::OutputError;
-use crate::scene::{Scene, SceneError, library};
+use crate::scene::{self, Scene, SceneError, library};
 use crate::study::StudyError;
 
 /// Contact of elasto-plastic bodies in 3D by Total-FETI domain decomposition on MPI.
@@ -216,6 +216,11 @@ fn find(source: &Source, comm: &dyn Comm) -> Result<Found, Failure> {
         _ => {}
     }
     Ok(Found { text: texts[2].clone(), origin: texts[3].clone() })
+}
+
+/// Whether the user changed the element of a body.
+fn is_chosen(source: &Source, body: &str) -> bool {
+    source.sets.iter().any(|set| scene::concerns(set, &format!("body.{body}.element")))
 }
 
 /// How results of a scene are called: its name, or the stem of its file, and the level if there is one.

@@ -21,6 +21,7 @@ use crate::sizing::counts::Counted;
 use crate::sizing::forecast::forecast;
 use crate::sizing::likeness::{Look, Refused};
 use crate::sizing::memory::Memory;
+use crate::study::adaptive::start::{Start, start};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -32,6 +33,9 @@ pub struct Check {
     ranks: Option<usize>,
 }
 
+/// What is told where meshes will be refined.
+const FIRST: &str = "all that follows is of the first meshes; what solver.error takes is not known before";
+
 /// Scenes of more tetrahedra are not built.
 const BUILT: u64 = 150_000;
 
@@ -42,7 +46,13 @@ const BUILT: u64 = 150_000;
 pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
     let source = &arguments.source;
     let mut monitor = Monitor::of_rank(comm.rank(), Mode::Off);
-    let scene = find(source, comm)?.at_level(source.level, &source.sets)?;
+    let mut scene = find(source, comm)?.at_level(source.level, &source.sets)?;
+    if scene.solver.error.is_some() {
+        let is_chosen = |name: &str| super::is_chosen(source, name);
+        let Start { read: [first, _], notes, .. } = start(&scene, is_chosen).map_err(Failure::Scene)?;
+        notes.into_iter().chain([FIRST.to_owned()]).for_each(|note| monitor.event(&Event::Note(note)));
+        scene = first;
+    }
     if let Some(file) = &source.summary {
         replace::probe(comm, file, Form::Text).map_err(Failure::Place)?;
     }

@@ -59,7 +59,8 @@ pub(super) fn carry_out(
 ) -> Result<i32, Failure> {
     let Setting { mut timer, out, conduct, signals } = setting;
     let mut monitor = Monitor::of_rank(comm.rank(), conduct.progress);
-    let tight = match Counted::new(scene) {
+    // Refined meshes are looked at when they are there.
+    let tight = match Counted::new(scene).filter(|_| scene.solver.error.is_none()) {
         Some(counted) => make_room(comm, &counted, conduct.ignore_memory)?,
         None => None,
     };

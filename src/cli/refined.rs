@@ -1,19 +1,22 @@
 //! Solves a scene on finer and finer meshes until its error is small enough, or a limit is reached.
 
-use super::Failure;
 use super::levels::{Run, unfit};
 use super::plan::Plan;
 use super::room::make_room;
+use super::{Failure, is_chosen};
+use crate::mesh::SolidMesh;
+use crate::mesh::quality::Quality;
 use crate::model::{self, Discrete, ModelError};
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
 use crate::record::rows::RefinementRow;
+use crate::record::state::State;
 use crate::restart::checkpoint::Unfit;
 use crate::results::checkpoint::Checkpoint;
 use crate::scene::{ErrorOf, Scene};
 use crate::sizing::counts::Counted;
 use crate::study::adaptive::error::{Known, estimate};
-use crate::study::adaptive::start::start;
+use crate::study::adaptive::start::{Start, start};
 use crate::study::adaptive::{Adaptive, marking, parts};
 use crate::study::{Begin, Solved};
 
@@ -29,7 +32,8 @@ const MOST: usize = 40;
 const CLEARLY: f64 = 100.0;
 
 impl Run<'_> {
-    /// Solves mesh after mesh, from where a checkpoint stands if there is one. Collective.
+    /// Solves mesh after mesh, from where a checkpoint stands if there is one. What goes wrong on a finer mesh leaves the result of the
+    /// one before. Collective.
     pub(super) fn refined(
         &self,
         plan: &mut Plan,
@@ -37,50 +41,84 @@ impl Run<'_> {
         mut checkpoint: Option<Checkpoint>,
         monitor: &mut Monitor,
     ) -> Result<(Discrete, Solved), Failure> {
-        let (comm, timer) = (self.comm, self.timer);
-        let is_chosen =
-            |name: &str| plan.source.sets.iter().any(|set| set.trim().starts_with(&format!("body.{name}.element")));
-        let start = start(scene, is_chosen).map_err(Failure::Scene)?;
-        let scene = &start.scene;
+        let start = start(scene, |name| is_chosen(&plan.source, name)).map_err(Failure::Scene)?;
         start.notes.iter().for_each(|note| monitor.event(&Event::Note(note.clone())));
-        let made = timer.time("discretisation", || Adaptive::new(&start, comm)).map_err(ModelError::from);
-        let (mut adaptive, of_meshes) = made?;
-        if let Some(file) = &checkpoint {
-            let unreadable = |reason| unfit(Unfit::Unreadable(reason));
-            adaptive.repeat(comm, file, plan.refinements.len()).map_err(unreadable)?;
-        }
+        let (mut adaptive, of_meshes) = self.first_meshes(&start, &checkpoint, plan.refinements.len())?;
+        let (scene, goal) = (&start.scene, start.scene.solver.error.unwrap_or_default());
+        let mut before = None;
         loop {
-            let began = timer.total_seconds();
-            let meshes = timer.time("discretisation", || adaptive.meshes(scene));
-            let mut discrete = timer.time("discretisation", || model::discretise_meshes(scene, meshes, None, comm))?;
-            discrete.warnings.extend(of_meshes.iter().cloned());
-            let begin = match checkpoint.take() {
-                Some(file) => self.at(&discrete, file, monitor)?,
-                None if plan.refinements.is_empty() || !scene.step.is_empty() => Begin::Rest,
-                None => Begin::Around(timer.time("interpolation", || adaptive.displacement(comm, &discrete))),
+            let began = self.timer.total_seconds();
+            let found = self.on_mesh(plan, scene, (&adaptive, &of_meshes), checkpoint.take(), monitor);
+            let (discrete, solved) = match (found, before.take()) {
+                (Ok(found), _) if found.1.summary.converged == Some(true) => found,
+                (Ok((_, failed)), Some(before)) => {
+                    return Ok(given_up(before, plan, goal, &failed.summary.error.unwrap_or_default()));
+                }
+                (Err(failure @ (Failure::Model(_) | Failure::Study(_))), Some(before)) => {
+                    return Ok(given_up(before, plan, goal, &failure.to_string()));
+                }
+                (found, _) => return found,
             };
-            let (discrete, mut solved) =
-                self.solve_problem(plan, scene, (discrete, adaptive.arrays()), begin, monitor)?;
             plan.refinements.push(self.row(scene, &plan.refinements, (&discrete, &solved), adaptive.unknowns(), began));
             let row = plan.refinements.last().expect("it was pushed");
-            let (found, goal) = (row.error, scene.solver.error.unwrap_or_default());
             monitor.event(&Event::Refinement { row: row.clone(), goal });
-            let is_compared = plan.refinements.len() > 1 || found * CLEARLY <= goal;
-            if solved.summary.converged != Some(true) || (found <= goal && is_compared) {
+            // An error of the energy is better known when meshes were compared.
+            let is_known =
+                plan.refinements.len() > 1 || scene.solver.error_of != ErrorOf::Energy || is_history(&plan.refinements);
+            if row.error <= goal && (is_known || row.error * CLEARLY <= goal) {
                 return Ok((discrete, solved));
             }
-            let finer =
-                timer.time("refinement of the mesh", || self.finer(scene, &adaptive, (&discrete, &solved), plan));
-            match finer {
-                Ok(finer) => adaptive = finer,
-                Err(limit) => {
-                    solved.summary.converged = Some(false);
-                    solved.summary.error =
-                        Some(format!("the error is about {:.2} %, not {:.2} %: {limit}", 100.0 * found, 100.0 * goal));
-                    return Ok((discrete, solved));
+            let finer = || self.finer(scene, &adaptive, (&discrete, &solved), plan);
+            match self.timer.time("refinement of the mesh", finer) {
+                Ok((finer, tight)) => {
+                    adaptive = finer;
+                    tight.into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
+                    before = Some((discrete, solved));
                 }
+                Err(_) if row.error <= goal => return Ok((discrete, solved)),
+                Err(limit) => return Ok(given_up((discrete, solved), plan, goal, &limit)),
             }
         }
+    }
+
+    /// The meshes to begin with, or those of a checkpoint, and what the user should know of them. Collective.
+    fn first_meshes(
+        &self,
+        start: &Start,
+        checkpoint: &Option<Checkpoint>,
+        refinements: usize,
+    ) -> Result<(Adaptive, Vec<String>), Failure> {
+        let made = self.timer.time("discretisation", || Adaptive::new(start, self.comm)).map_err(ModelError::from);
+        let (mut adaptive, mut of_meshes) = made?;
+        match checkpoint {
+            Some(file) => {
+                let unreadable = |reason| unfit(Unfit::Unreadable(reason));
+                adaptive.repeat(self.comm, file, refinements).map_err(unreadable)?;
+            }
+            None => of_meshes.extend(self.room(&start.scene, &adaptive).map_err(Failure::Memory)?),
+        }
+        Ok((adaptive, of_meshes))
+    }
+
+    /// Solves on the meshes that there are, near the displacement that these have. Collective.
+    fn on_mesh(
+        &self,
+        plan: &Plan,
+        scene: &Scene,
+        (adaptive, of_meshes): (&Adaptive, &[String]),
+        checkpoint: Option<Checkpoint>,
+        monitor: &mut Monitor,
+    ) -> Result<(Discrete, Solved), Failure> {
+        let (comm, timer) = (self.comm, self.timer);
+        let mut discrete =
+            timer.time("discretisation", || model::discretise_meshes(scene, adaptive.meshes(scene), None, comm))?;
+        discrete.warnings.extend(of_meshes.iter().cloned());
+        let begin = match checkpoint {
+            Some(file) => self.at(&discrete, file, monitor)?,
+            None if plan.refinements.is_empty() || is_history(&plan.refinements) => Begin::Rest,
+            None => Begin::Around(timer.time("interpolation", || adaptive.displacement(comm, &discrete))),
+        };
+        self.solve_problem(plan, scene, (discrete, adaptive.arrays()), begin, monitor)
     }
 
     /// What a solved mesh took, and its error.
@@ -93,29 +131,30 @@ impl Run<'_> {
         began: f64,
     ) -> RefinementRow {
         let summary = &solved.summary;
-        let (energy, errors) = (summary.state.energy.unwrap_or(f64::NAN), &summary.state.errors);
-        let distance = marking::total(self.comm, &parts(discrete, solved, ErrorOf::Energy));
-        let gap = errors.duality_gap.unwrap_or(0.0);
-        let stress = errors.discretisation.unwrap_or(f64::NAN);
-        let of_row = |row: &RefinementRow| Known {
-            energy: row.energy,
-            distance: row.distance,
-            gap: row.gap,
-            stress: row.stress,
+        // Of all increments the largest, as elements have it.
+        let largest = |of: fn(&State) -> Option<f64>| {
+            let values = summary.steps.iter().filter_map(|step| of(&step.state));
+            values.filter(|value| value.is_finite()).reduce(f64::max)
         };
-        let known: Vec<Known> = before.iter().map(of_row).chain([Known { energy, distance, gap, stress }]).collect();
-        RefinementRow {
+        let row = RefinementRow {
             elements: summary.sizes.elements,
             unknowns,
-            error: estimate(scene.solver.error_of, &known, !scene.step.is_empty()),
-            energy,
-            distance,
-            gap,
-            stress,
+            increments: summary.steps.len() as u64,
+            error: f64::MAX,
+            energy: summary.state.energy.filter(|energy| energy.is_finite()).unwrap_or_default(),
+            size: largest(|state| state.energy.map(f64::abs)).unwrap_or_default(),
+            distance: marking::total(self.comm, &parts(discrete, solved, ErrorOf::Energy)),
+            gap: largest(|state| state.errors.duality_gap).unwrap_or_default(),
+            stress: largest(|state| state.errors.discretisation).unwrap_or(f64::MAX),
             newton_iterations: summary.newton_iterations,
             hessian_multiplications: summary.counters.hessian_multiplications,
             seconds: self.timer.total_seconds() - began,
-        }
+        };
+        let rows: Vec<RefinementRow> = before.iter().chain([&row]).cloned().collect();
+        let known: Vec<Known> = rows.iter().map(known).collect();
+        // Files have no infinite numbers.
+        let error = estimate(scene.solver.error_of, &known, is_history(&rows)).min(f64::MAX);
+        RefinementRow { error, ..row }
     }
 
     /// The next meshes, or the limit that they would be beyond. Collective.
@@ -125,7 +164,7 @@ impl Run<'_> {
         adaptive: &Adaptive,
         (discrete, solved): (&Discrete, &Solved),
         plan: &Plan,
-    ) -> Result<Adaptive, String> {
+    ) -> Result<(Adaptive, Option<String>), String> {
         if plan.refinements.len() == MOST {
             return Err(format!("{MOST} meshes did not reach it"));
         }
@@ -145,21 +184,45 @@ impl Run<'_> {
                 return Err("no element has more of it than others".into());
             }
             match self.room(scene, &finer) {
-                Ok(()) => return Ok(finer),
+                Ok(tight) => return Ok((finer, tight)),
                 Err(beyond) => limit = beyond,
             }
         }
         Err(limit)
     }
 
-    /// Whether there is room for meshes, and if not, why. Collective.
-    fn room(&self, scene: &Scene, adaptive: &Adaptive) -> Result<(), String> {
+    /// Whether there is room for meshes, or hardly; if not, why. Collective.
+    fn room(&self, scene: &Scene, adaptive: &Adaptive) -> Result<Option<String>, String> {
         let unknowns = adaptive.unknowns();
         if let Some(most) = scene.solver.max_unknowns.filter(|&most| unknowns > most) {
             return Err(format!("the next mesh would have {unknowns} unknowns, and solver.max_unknowns is {most}"));
         }
         let meshes = adaptive.meshes(scene);
+        let is_sound = |mesh: &SolidMesh| Quality::of(self.comm, &mesh.portion).is_sound();
+        if !meshes.solids.values().all(is_sound) {
+            return Err(
+                "elements of a thin wall would turn inside out on its curved surface; begin with more cells".into()
+            );
+        }
         let counted = Counted::of_meshes(scene, &meshes.bodies);
-        make_room(self.comm, &counted, self.ignore_memory).map(|_| ()).map_err(|error| error.to_string())
+        make_room(self.comm, &counted, self.ignore_memory).map_err(|error| error.to_string())
     }
+}
+
+/// The result of the mesh before, and why there is no better one.
+fn given_up((discrete, mut solved): (Discrete, Solved), plan: &Plan, goal: f64, reason: &str) -> (Discrete, Solved) {
+    let found = plan.refinements.last().map_or(f64::MAX, |row| row.error);
+    solved.summary.converged = Some(false);
+    solved.summary.error =
+        Some(format!("the error is about {:.2} %, not {:.2} %: {reason}", 100.0 * found, 100.0 * goal));
+    (discrete, solved)
+}
+
+/// Whether a mesh took more than one increment: energies are of steps from different states then.
+fn is_history(rows: &[RefinementRow]) -> bool {
+    rows.iter().any(|row| row.increments > 1)
+}
+
+fn known(&RefinementRow { energy, size, distance, gap, stress, .. }: &RefinementRow) -> Known {
+    Known { energy, size, distance, gap, stress }
 }

@@ -99,6 +99,19 @@ pub struct Conditions {
     pub count: usize,
     /// Slave nodes of all ranks that carry no condition because supports hold them.
     pub held: usize,
+    /// How far a distance of one along the surface's normals opens each condition: 1 but where a condition is a mean over a curved
+    /// surface. None where all are 1.
+    pub openings: Vec<f64>,
+}
+
+impl Conditions {
+    /// Sets the gaps to a distance that is given, or adds one to those that were found.
+    pub fn prescribe(&mut self, clearance: Option<f64>, gap: f64) {
+        let openings = self.openings.iter().copied().chain(std::iter::repeat(1.0));
+        for (pair, opening) in self.pairs.iter_mut().zip(openings) {
+            pair.gap = clearance.map_or(pair.gap + opening * gap, |clearance| opening * clearance);
+        }
+    }
 }
 
 /// Why two surfaces cannot be paired.

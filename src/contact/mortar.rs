@@ -7,7 +7,8 @@
 //! `n_j . (sum of D_jk / W_j x_k - sum of M_jl / W_j x_l) <= 0`
 //!
 //! at positions `x` after the displacement (Wohlmuth 2011; Popp, Gitterle, Gee, Wall 2010). The sums run over slave nodes `k`,
-//! usually `j` alone, and master nodes `l`. A constant pressure acts with the same resultant on both sides and on every
+//! usually `j` alone, and master nodes `l`. A distance `c` that is prescribed along the surface's normals opens it by
+//! `c n_j . (sum of D_jk / W_j n_k)`, which is `c` but on curved quadratic faces. A constant pressure acts with the same resultant on both sides and on every
 //! node as it should: flat surfaces pass the patch test whatever their meshes. Normals stay those of the start.
 //!
 //! All integrals are over what has the master opposite. On faces that it covers in part, multipliers move to its edge
@@ -108,9 +109,15 @@ pub fn conditions(
             covered: reach[node] >= AT_THE_EDGE,
         }
     };
+    // Where both surfaces are a distance of one apart along the normals of the slave, means see that along the normal of the node.
+    let opening = |(&node, sums): (&usize, &Sums)| {
+        let along = |(&k, sum): (&usize, &f64)| sum / sums.whole * dot(normals[k].0, normals[node].0);
+        sums.slaves.iter().map(along).sum()
+    };
+    let openings = sums.iter().map(opening).collect();
     let masters = master_nodes(contact, &parts, master, &of_node);
     let pairs = sums.into_iter().map(condition).collect();
-    (Conditions { pairs, masters, count, held }, !parts.is_empty())
+    (Conditions { pairs, masters, count, held, openings }, !parts.is_empty())
 }
 
 /// What is wrong with the conditions of all ranks, if anything; `is_opposite` says whether surfaces face each other anywhere.

@@ -101,9 +101,7 @@ fn one(
         }
         _ => unreachable!("two sides have two surfaces"),
     };
-    for pair in &mut conditions.pairs {
-        pair.gap = contact.clearance.unwrap_or(pair.gap + contact.gap);
-    }
+    conditions.prescribe(contact.clearance, contact.gap);
     let (mut warnings, pairs, patch) = (Vec::new(), &conditions.pairs, &surfaces[slave].1);
     if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
         let found = sagitta::unresolved(comm, patch, &master.1, pairs);

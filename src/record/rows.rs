@@ -62,10 +62,14 @@ pub struct RefinementRow {
     pub elements: u64,
     /// Unknowns: three a node.
     pub unknowns: u64,
+    /// Increments of the load that it took.
+    pub increments: u64,
     /// Estimated error of what the scene asks for, relative.
     pub error: f64,
-    /// `J(u)`.
+    /// `J(u)`, of the last increment.
     pub energy: f64,
+    /// What errors of the energy are relative to: the largest `|J(u)|` of an increment.
+    pub size: f64,
     /// Sum of the Bregman distances (energy), which the error of the energy is estimated from.
     pub distance: f64,
     /// `J(u)` is at most so much above its least value on this mesh.

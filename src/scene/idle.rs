@@ -4,7 +4,7 @@
 //! the default was written cannot be told, and does not matter.
 
 use super::load::Load;
-use super::{Method, Qp, Scene, Step};
+use super::{ErrorOf, Method, Qp, Scene, Step};
 
 /// A sentence for each key without effect, section by section.
 pub(super) fn warnings(scene: &Scene) -> Vec<String> {
@@ -114,6 +114,14 @@ fn settings(scene: &Scene) -> Vec<String> {
     if scene.decomposition.idle_cells {
         let method = if scene.decomposition.method == Method::Auto { "auto" } else { "metis" };
         found.push(format!("decomposition.cells: method = \"{method}\" does not use them, but \"bricks\" does"));
+    }
+    if scene.solver.error.is_none() {
+        let idle = [
+            ("error_of", scene.solver.error_of != ErrorOf::default()),
+            ("max_unknowns", scene.solver.max_unknowns.is_some()),
+        ];
+        let given = idle.into_iter().filter(|(_, is_given)| *is_given);
+        found.extend(given.map(|(key, _)| format!("solver.{key}: without solver.error no mesh is refined")));
     }
     if scene.solver.qp == Qp::SmalseM && scene.contact.is_empty() {
         found.push("solver.qp: without contact there is no quadratic program, but equations".to_owned());

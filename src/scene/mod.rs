@@ -43,7 +43,7 @@ pub use held::Held;
 pub use initial::Initial;
 pub use load::Load;
 pub use mapped::{Cylinder, Grid, Sphere};
-pub use overrides::{recut, well_formed};
+pub use overrides::{concerns, recut, well_formed};
 pub use solver::{ErrorOf, Precision, Preconditioner, Qp, Solver};
 pub use step::Step;
 pub use surface::{Face, Support, SurfaceError, SurfaceName};

@@ -42,7 +42,7 @@ pub(super) fn blame(tree: &Table, sets: &[String], error: &toml::de::Error) -> S
 }
 
 /// Whether this override gives the key its value, as a whole or in part.
-pub(super) fn concerns(set: &str, key: &str) -> bool {
+pub fn concerns(set: &str, key: &str) -> bool {
     parse(set).is_ok_and(|Override { mut path, .. }| {
         path.pop_if(|last| last.parse::<usize>().is_ok());
         let path = path.join(".");

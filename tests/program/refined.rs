@@ -25,6 +25,19 @@ fn the_error_is_what_was_asked_for() {
     assert_eq!(row["elements"], summary["elements"]);
 }
 
+/// Contact of curved surfaces whose meshes stop to match. The least energy is the limit of uniform meshes, which match.
+#[test]
+fn curved_contact_does_not_limit_the_error() {
+    const LEAST_ENERGY: f64 = -1_301_975.0;
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/precision/nested-spheres.toml");
+    let cells = ["inner", "outer"].map(|body| format!("body.{body}.sphere.cells=[2, 2]"));
+    for (error, wanted) in [("0.05%", 5e-4), ("0.01%", 1e-4)] {
+        let run = solve_with(2, scene, 1, &[&cells[0], &cells[1]], &["--error", error]);
+        let found = (number(&run.converged().summary(), "energy") / LEAST_ENERGY - 1.0).abs();
+        assert!((0.4..1.0).contains(&(found / wanted)), "{error}: {found}");
+    }
+}
+
 #[test]
 fn ranks_change_no_bit_of_it() {
     let of = |ranks| {

@@ -13,7 +13,7 @@ fn told(list: &[&str]) -> Vec<String> {
 
 #[test]
 fn what_has_no_effect_is_told_by_its_key() {
-    let cases: [(&[&str], &str); 15] = [
+    let cases: [(&[&str], &str); 17] = [
         (&["material.spare={young=1, poisson=0}"], "material.spare: no body"),
         (&["load.side={surface='block.xmax', traction=[0, 0, 0]}"], "load.side is zero"),
         (&["load.side={surface='block.xmax', pressure=0}"], "load.side is zero"),
@@ -29,6 +29,8 @@ fn what_has_no_effect_is_told_by_its_key() {
         (&["decomposition.method=metis", "decomposition.cells=[2, 2, 2]"], "decomposition.cells: method = \"metis\""),
         (&["decomposition.method=auto", "decomposition.cells=[2, 2, 2]"], "decomposition.cells: method = \"auto\""),
         (&["solver.qp=smalse-m"], "solver.qp: without contact"),
+        (&["solver.error_of=stress"], "solver.error_of: without solver.error"),
+        (&["solver.max_unknowns=100"], "solver.max_unknowns: without solver.error"),
         (&["support.also={surface='block.zmin', fix=['x', 'y', 'z']}"], "support.base: other supports"),
         (&["load.top={surface='block.zmax', traction=[0, 0, 0]}"], "load.top is zero"),
         (

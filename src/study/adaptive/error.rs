@@ -9,7 +9,7 @@
 //! ```
 //!
 //! the larger one with the last two meshes on which `D_1` was at least [`APART`] times `D_2`, and `theta` is at least [`LEAST`]: where bodies touch, conditions
-//! are those of a mesh, and energies need not fall. `gap` bounds what the solver left. Until there is such a mesh, `theta` is [`UNKNOWN`]. Energies of a
+//! are those of a mesh, and energies need not fall. Where one rises, the error is taken to be as large at least. `gap` bounds what the solver left. Until there is such a mesh, `theta` is [`UNKNOWN`]. Energies of a
 //! history are those of its last increment, which begins from another state on each mesh: there `theta` stays so.
 //!
 //! Of the stress: the estimate of [`crate::estimate`], by [`SAFETY`] larger.
@@ -31,6 +31,8 @@ const UNKNOWN: f64 = 1.5;
 pub struct Known {
     /// `J(u)`.
     pub energy: f64,
+    /// What errors of it are relative to.
+    pub size: f64,
     /// Sum of the Bregman distances.
     pub distance: f64,
     /// `J(u)` is at most so much above its least value on the mesh.
@@ -46,10 +48,16 @@ pub fn estimate(of: ErrorOf, meshes: &[Known], is_history: bool) -> f64 {
         ErrorOf::Stress => SAFETY * last.stress,
         ErrorOf::Energy => {
             let theta = if is_history { UNKNOWN } else { factor(meshes) };
-            let above = theta * last.distance + last.gap;
-            if above == 0.0 { 0.0 } else { above / last.energy.abs() }
+            let above = (theta * last.distance + last.gap).max(if is_history { 0.0 } else { rise(meshes) });
+            if above == 0.0 { 0.0 } else { above / last.size }
         }
     }
+}
+
+/// How far the last mesh raised the energy: shapes or conditions changed, and the error is as large at least.
+fn rise(meshes: &[Known]) -> f64 {
+    let [.., before, last] = meshes else { return 0.0 };
+    last.energy - before.energy
 }
 
 /// `theta`.
@@ -66,7 +74,7 @@ mod tests {
     use super::*;
 
     fn known(energy: f64, distance: f64) -> Known {
-        Known { energy, distance, gap: 0.0, stress: 0.1 }
+        Known { energy, size: energy.abs(), distance, gap: 0.0, stress: 0.1 }
     }
 
     #[test]
@@ -96,6 +104,8 @@ mod tests {
         assert_eq!(estimate(ErrorOf::Energy, &meshes, true), UNKNOWN / 9.5);
         assert_eq!(error(&[Known { gap: 0.5, ..known(-5.0, 1.0) }]), (UNKNOWN + 0.5) / 5.0);
         assert_eq!(error(&[known(0.0, 0.0)]), 0.0);
+        // What rises cannot be known better than that.
+        assert_eq!(error(&[known(-7.0, 1.0), known(-5.0, 0.1)]), 2.0 / 5.0);
         assert_eq!(error(&[]), f64::INFINITY);
     }
 }

@@ -43,7 +43,14 @@ impl Adaptive {
     /// # Errors
     /// If there are none.
     pub fn new(Start { scene, read, .. }: &Start, comm: &dyn Comm) -> Result<(Self, Vec<String>), MeshError> {
-        let Meshes { solids, warnings, .. } = Meshes::new(read, comm)?;
+        let [given, linear] = read;
+        let made = match Meshes::new(given, comm) {
+            Err(MeshError::Bad(reason)) if linear != given => {
+                Meshes::new(linear, comm).map_err(|_| MeshError::Bad(reason))
+            }
+            made => made,
+        };
+        let Meshes { solids, warnings, .. } = made?;
         let of = |(body, mesh): (&scene::Body, _)| Refinable::new(comm, mesh, mapped(&body.shape), body.element);
         let bodies = scene.body.values().zip(solids.values()).map(of).collect();
         Ok((Self { bodies, past: Vec::new() }, warnings))

@@ -17,8 +17,9 @@ const ACCURACY: f64 = 0.3;
 pub struct Start {
     /// The scene with the elements that are solved with; none of its bodies is a brick.
     pub scene: Scene,
-    /// The same with the elements that its mesh files have: linear ones become quadratic when they are read.
-    pub read: Scene,
+    /// The same with the elements that its mesh files may have, to be tried in this order: those that were given, and linear ones. They
+    /// become quadratic when they are read.
+    pub read: [Scene; 2],
     /// What was decided, in words.
     pub notes: Vec<String>,
 }
@@ -66,14 +67,18 @@ pub fn start(scene: &Scene, is_chosen: impl Fn(&str) -> bool) -> Result<Start, S
             body.shape = Shape::Grid(Grid { x, y, z });
         }
     }
-    if let Method::Bricks { .. } = scene.decomposition.method {
+    if scene.decomposition.method != Method::Auto {
+        notes.push("each mesh is cut into as many subdomains as cost least, whatever `decomposition` says".to_owned());
         scene.decomposition.method = Method::Auto;
     }
     scene.solver.accuracy.get_or_insert(ACCURACY);
-    let mut read = scene.clone();
-    for (body, given) in read.body.values_mut().zip(given.body.values()).filter(|(_, given)| given.gmsh().is_some()) {
+    let mut read = [scene.clone(), scene.clone()];
+    for (name, body) in given.body.iter().filter(|(_, body)| body.gmsh().is_some()) {
         // Cells that are no tetrahedra are split into linear ones.
-        body.element = if given.element.cell() == Cell::Tetrahedron { given.element } else { linear() };
+        let of_file = if body.element.cell() == Cell::Tetrahedron { body.element } else { linear() };
+        for (scene, element) in read.iter_mut().zip([of_file, linear()]) {
+            scene.body.get_mut(name).expect("bodies are the same").element = element;
+        }
     }
     Ok(Start { scene, read, notes })
 }
