@@ -1,11 +1,11 @@
 //! Refinement of a body's mesh of tetrahedra by bisection, conforming, on all ranks together.
 //!
 //! Sweep by sweep all elements are bisected that are due or have an edge that was bisected on one of their sides; bisection ends as
-//! [`tagged`] edges agree. New nodes and elements are numbered behind the old ones, in the order of the edges and elements that
-//! they come from: the refined mesh does not depend on the ranks ([`register`]). A rank keeps its elements while it bisects, and
+//! `tagged` edges agree. New nodes and elements are numbered behind the old ones, in the order of the edges and elements that
+//! they come from: the refined mesh does not depend on the ranks (`register`). A rank keeps its elements while it bisects, and
 //! ranks tell each other which edges on their borders are bisected.
 //!
-//! A [`cell`] inherits region, piece and surfaces. Straight elements are split exactly; so are curved ones of second order, whose
+//! A `cell` inherits region, piece and surfaces. Straight elements are split exactly; so are curved ones of second order, whose
 //! halves are the same quadratic patch. On spheres and cylinders of a [`Mapped`] body new nodes are put on the surface. Every node
 //! carries a displacement, which is passed on as shape functions interpolate it: exactly, where nodes are not moved.
 

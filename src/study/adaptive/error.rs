@@ -1,18 +1,18 @@
 //! The error of a solution on a sequence of finer and finer meshes.
 //!
 //! Of the energy: minima over spaces of which each contains the one before fall, and `J(u_1) - J(u_2)` is the difference of two errors.
-//! The [Bregman distances](crate::estimate::bregman) `D_1` and `D_2` estimate both, too large or too small by a factor that changes little from
+//! The Bregman distances (`estimate::bregman`) `D_1` and `D_2` estimate both, too large or too small by a factor that changes little from
 //! mesh to mesh. So this factor is measured:
 //!
 //! ```text
 //! J(u_h) - J  ~  theta D_h + gap,   theta = (J(u_1) - J(u_2)) / (D_1 - D_2),
 //! ```
 //!
-//! the larger one with the last two meshes on which `D_1` was at least [`APART`] times `D_2`, and `theta` is at least [`LEAST`]: where bodies touch, conditions
-//! are those of a mesh, and energies need not fall. Where one rises, the error is taken to be as large at least. `gap` bounds what the solver left. Until there is such a mesh, `theta` is [`UNKNOWN`]. Energies of a
+//! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`, and `theta` is at least `LEAST`: where bodies touch, conditions
+//! are those of a mesh, and energies need not fall. Where one rises, the error is taken to be as large at least. `gap` bounds what the solver left. Until there is such a mesh, `theta` is `UNKNOWN`. Energies of a
 //! history are those of its last increment, which begins from another state on each mesh: there `theta` stays so.
 //!
-//! Of the stress: the estimate of [`crate::estimate`], by [`SAFETY`] larger.
+//! Of the stress: the estimate of `estimate`, by `SAFETY` larger.
 
 use crate::scene::ErrorOf;
 

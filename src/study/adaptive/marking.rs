@@ -1,6 +1,6 @@
 //! Which elements to bisect, and how often: as many as leave a given share of the error, spread evenly.
 //!
-//! Every element has a part of the error (its square, or an energy). A bisection of an element is taken to leave [`LEFT`] of its part in
+//! Every element has a part of the error (its square, or an energy). A bisection of an element is taken to leave `LEFT` of its part in
 //! both halves together. All elements with more than a limit are bisected until no part is foretold to be above it. The limit is the
 //! largest one that leaves the wanted share; it is found by bisection of its logarithm, from exact sums, so it does not depend on the
 //! ranks.
