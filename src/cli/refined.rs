@@ -32,8 +32,8 @@ const MOST: usize = 40;
 const CLEARLY: f64 = 100.0;
 
 impl Run<'_> {
-    /// Solves mesh after mesh, from where a checkpoint stands if there is one. What goes wrong on a finer mesh leaves the result of the
-    /// one before. Collective.
+    /// Solves mesh after mesh, from where a checkpoint stands if there is one. What goes wrong on a finer mesh leaves the result
+    /// of the one before. Collective.
     pub(super) fn refined(
         &self,
         plan: &mut Plan,

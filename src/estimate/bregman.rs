@@ -1,14 +1,14 @@
 //! How far the energy of a solution is above the least one, element by element.
 //!
-//! The strain `eps*` is recovered from that of the finite elements as stresses are ([`super`]). If it were the exact one, `J(u_h) - J`
-//! would be, but for what contact does,
+//! The strain `eps*` is recovered from that of the finite elements as stresses are ([`super`]). If it were the exact one,
+//! `J(u_h) - J` would be, but for what contact does,
 //!
 //! ```text
 //! int Psi(eps*) - Psi(eps_h) - sigma_h : (eps* - eps_h),
 //! ```
 //!
-//! the Bregman distance of the convex potential `Psi`. Where the material yields it sees what the elastic energy of the difference of
-//! stresses does not: stresses hardly change there with the strain.
+//! the Bregman distance of the convex potential `Psi`. Where the material yields it sees what the elastic energy of the
+//! difference of stresses does not: stresses hardly change there with the strain.
 //!
 //! It is an estimate, no bound: the recovered strain lies between that of the elements and the exact one where this is singular, so
 //! the distance is too small there; how much so hardly changes from mesh to mesh.

@@ -1,7 +1,11 @@
 //! Meshes are refined until the error is as small as the user asks for.
 
 use crate::checkpoint::{assert_same_result, resume_with, stopped_after};
-use crate::common::{assert_refused, assert_scene_refused, number, only_result, run_briefly, run_misused, solve_with};
+use crate::common::fields::Fields;
+use crate::common::{
+    assert_close, assert_refused, assert_scene_refused, number, only_result, run_briefly, run_misused, scene_file,
+    solve_with,
+};
 use serde_json::Value;
 
 /// Of two-blocks, from two families of adaptive meshes of another program.
@@ -36,6 +40,39 @@ fn curved_contact_does_not_limit_the_error() {
         let found = (number(&run.converged().summary(), "energy") / LEAST_ENERGY - 1.0).abs();
         assert!((0.4..1.0).contains(&(found / wanted)), "{error}: {found}");
     }
+}
+
+/// A rigid ball on a block that begins with 162 tetrahedra: the pressure on its axis is that of Hertz for the force that is found.
+#[test]
+fn the_peak_of_a_pressure_is_found_from_a_few_hundred_elements() {
+    const TEXT: &str = r#"
+        [material.steel]
+        young = 210000.0
+        poisson = 0.3
+        [body.block]
+        material = "steel"
+        element = "tet4"
+        brick = { origin = [0.0, 0.0, -13.0], size = [13.0, 13.0, 13.0], cells = [3, 3, 3] }
+        [support]
+        x = { surface = "block.xmin", fix = ["x"] }
+        y = { surface = "block.ymin", fix = ["y"] }
+        ground = { surface = "block.zmin", fix = ["z"] }
+        [contact.ball]
+        slave = "block.zmax"
+        rigid = { sphere = { centre = [0.0, 0.0, 99.99], radius = 100.0 } }
+    "#;
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), TEXT);
+    let run = solve_with(2, &scene, 1, &[], &["--error", "0.02%"]);
+    let fields = Fields::read(&run.result());
+    let summary = run.converged().summary();
+    assert_eq!(rows(&summary)[0]["elements"], 162);
+    let force = 4.0 * summary["contact_force"][2].as_f64().unwrap().abs();
+    let modulus = 210_000.0 / (1.0 - 0.3 * 0.3);
+    let radius = (0.75 * force * 100.0 / modulus).cbrt();
+    let peak = 1.5 * force / (std::f64::consts::PI * radius * radius);
+    let on_axis = fields.points.iter().position(|x| *x == [0.0; 3]).unwrap();
+    assert_close("peak pressure", fields.of_points("contact_pressure")[on_axis], peak, 0.01);
 }
 
 #[test]

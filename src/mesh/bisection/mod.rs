@@ -135,8 +135,8 @@ impl Refinable {
         self.nodes.iter_mut().for_each(|(&node, at)| at[1] = of(node));
     }
 
-    /// Bisects elements, named by their corners (ascending), at least so many times, and as many others as it takes for a conforming
-    /// mesh. Any rank may name an element. Collective.
+    /// Bisects elements, named by their corners (ascending), at least so many times, and as many others as it takes for a
+    /// conforming mesh. Any rank may name an element. Collective.
     pub fn refine(&mut self, comm: &dyn Comm, wanted: &[(Vec<u32>, usize)]) {
         self.balance(comm);
         let mut nodes: Vec<u32> = self.nodes().collect();

@@ -1,11 +1,11 @@
 //! Which edge of a tetrahedron is bisected next (Arnold, Mukherjee and Pouly, "Locally adapted tetrahedral meshes using
 //! bisection", SIAM J. Sci. Comput. 22 (2000) 431).
 //!
-//! Every face has a marked edge, and the refinement edge is that of both faces beside it. At first the longest edge of a face
-//! is marked, of equal ones the one with the larger numbers, so tetrahedra agree on their common faces. Bisected again and again,
-//! a tetrahedron has descendants of finitely many shapes: each contains a copy of it, scaled by some `a`, and is in another, scaled by
-//! some `b`, with `a / b` at least 0.08 (computed by the tests). So the ratio of inscribed sphere to longest edge never falls below that share of
-//! the first one's.
+//! Every face has a marked edge, and the refinement edge is that of both faces beside it. At first the longest edge of a face is
+//! marked, of equal ones the one with the larger numbers, so tetrahedra agree on their common faces. Bisected again and again, a
+//! tetrahedron has descendants of finitely many shapes: each contains a copy of it, scaled by some `a`, and is in another,
+//! scaled by some `b`, with `a / b` at least 0.08 (computed by the tests). So the ratio of inscribed sphere to longest edge
+//! never falls below that share of the first one's.
 
 /// Bound on the shapes of descendants, see the header; over all first tags, as the tests compute it.
 #[cfg(test)]

@@ -1,16 +1,17 @@
 //! The error of a solution on a sequence of finer and finer meshes.
 //!
-//! Of the energy: minima over spaces of which each contains the one before fall, and `J(u_1) - J(u_2)` is the difference of two errors.
-//! The Bregman distances (`estimate::bregman`) `D_1` and `D_2` estimate both, too large or too small by a factor that changes little from
-//! mesh to mesh. So this factor is measured:
+//! Of the energy: minima over spaces of which each contains the one before fall, and `J(u_1) - J(u_2)` is the difference of two
+//! errors. The Bregman distances (`estimate::bregman`) `D_1` and `D_2` estimate both, too large or too small by a factor that
+//! changes little from mesh to mesh. So this factor is measured:
 //!
 //! ```text
 //! J(u_h) - J  ~  theta D_h + gap,   theta = (J(u_1) - J(u_2)) / (D_1 - D_2),
 //! ```
 //!
-//! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`, and `theta` is at least `LEAST`: where bodies touch, conditions
-//! are those of a mesh, and energies need not fall. Where one rises, the error is taken to be as large at least. `gap` bounds what the solver left. Until there is such a mesh, `theta` is `UNKNOWN`. Energies of a
-//! history are those of its last increment, which begins from another state on each mesh: there `theta` stays so.
+//! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`, and `theta` is at least `LEAST`:
+//! where bodies touch, conditions are those of a mesh, and energies need not fall. Where one rises, the error is taken to be as
+//! large at least. `gap` bounds what the solver left. Until there is such a mesh, `theta` is `UNKNOWN`. Energies of a history
+//! are those of its last increment, which begins from another state on each mesh: there `theta` stays so.
 //!
 //! Of the stress: the estimate of `estimate`, by `SAFETY` larger.
 
@@ -21,7 +22,8 @@ const SAFETY: f64 = 1.2;
 /// Distances of two meshes differ by this factor: those of meshes nearer to each other tell more of how elements happen to lie.
 const APART: f64 = 2.0;
 
-/// The true factor was 0.46 on smooth solutions, whose strains are recovered well, up to 1.9 where fronts of plastic flow and edges are.
+/// The true factor was 0.46 on smooth solutions, whose strains are recovered well, up to 1.9 where fronts of plastic flow and
+/// edges are.
 const LEAST: f64 = 0.5;
 /// Where nothing tells it.
 const UNKNOWN: f64 = 1.5;

@@ -1,9 +1,9 @@
 //! Which elements to bisect, and how often: as many as leave a given share of the error, spread evenly.
 //!
-//! Every element has a part of the error (its square, or an energy). A bisection of an element is taken to leave `LEFT` of its part in
-//! both halves together. All elements with more than a limit are bisected until no part is foretold to be above it. The limit is the
-//! largest one that leaves the wanted share; it is found by bisection of its logarithm, from exact sums, so it does not depend on the
-//! ranks.
+//! Every element has a part of the error (its square, or an energy). A bisection of an element is taken to leave `LEFT` of its
+//! part in both halves together. All elements with more than a limit are bisected until no part is foretold to be above it. The
+//! limit is the largest one that leaves the wanted share; it is found by bisection of its logarithm, from exact sums, so it does
+//! not depend on the ranks.
 
 use super::Wanted;
 use crate::comm::{Comm, exact, maximum};
@@ -29,8 +29,8 @@ fn times(part: f64, limit: f64) -> i32 {
     if part <= limit { 0 } else { ((part / limit).ln() / -(0.5 * LEFT).ln()).ceil().min(f64::from(MOST)) as i32 }
 }
 
-/// The elements to be bisected so that a share of the error is left, as far as can be foretold; `parts` are those of the elements of
-/// each own subdomain. Collective.
+/// The elements to be bisected so that a share of the error is left, as far as can be foretold; `parts` are those of the
+/// elements of each own subdomain. Collective.
 pub fn wanted(comm: &dyn Comm, discrete: &Discrete, parts: &[Vec<f64>], share: f64) -> Wanted {
     let left = |limit: f64| {
         let left = |part: &f64| part * LEFT.powi(times(*part, limit));

@@ -1,8 +1,8 @@
 //! Meshes as fine as an error asks for.
 //!
-//! A scene begins on few elements ([`start`]). When it is solved there, the [`error`] is estimated; [`marking`] names the elements
-//! that have most of it, these are bisected ([`crate::mesh::bisection`]), and the displacement passes to the finer meshes. What was bisected
-//! is kept: a run that goes on makes the same meshes from the first ones again.
+//! A scene begins on few elements ([`start`]). When it is solved there, the [`error`] is estimated; [`marking`] names the
+//! elements that have most of it, these are bisected ([`crate::mesh::bisection`]), and the displacement passes to the finer
+//! meshes. What was bisected is kept: a run that goes on makes the same meshes from the first ones again.
 
 pub mod error;
 pub mod marking;

@@ -1,8 +1,9 @@
 //! The scene of the first meshes: as few elements as tell what the bodies are.
 //!
-//! Bricks are cut into cells of nearly equal edges, `ACROSS` of them across the thinnest brick, but no more than the scene has. Other
-//! structured bodies and meshes from files are taken as they are; straight elements of a file stay straight, however they are refined. Elements become quadratic tetrahedra: for the same error they take
-//! a fraction of the unknowns of linear ones, which lock where the material flows.
+//! Bricks are cut into cells of nearly equal edges, `ACROSS` of them across the thinnest brick, but no more than the scene has.
+//! Other structured bodies and meshes from files are taken as they are; straight elements of a file stay straight, however they
+//! are refined. Elements become quadratic tetrahedra: for the same error they take a fraction of the unknowns of linear ones,
+//! which lock where the material flows.
 
 use crate::element::Cell;
 use crate::element::Kind;
@@ -17,8 +18,8 @@ const ACCURACY: f64 = 0.3;
 pub struct Start {
     /// The scene with the elements that are solved with; none of its bodies is a brick.
     pub scene: Scene,
-    /// The same with the elements that its mesh files may have, to be tried in this order: those that were given, and linear ones. They
-    /// become quadratic when they are read.
+    /// The same with the elements that its mesh files may have, to be tried in this order: those that were given, and linear
+    /// ones. They become quadratic when they are read.
     pub read: [Scene; 2],
     /// What was decided, in words.
     pub notes: Vec<String>,
