@@ -7,7 +7,7 @@ import typing
 
 from . import measure, plot
 from .measure import RESULTS, Run
-from .pages import table
+from .pages import of_cases, table
 
 RANKS = 2
 RAW = measure.RAW / "adaptive"
@@ -175,14 +175,4 @@ def section(case, records):
 
 
 def pages():
-    found = {case: records for case, records in read().items() if records}
-    if not found:
-        return {}
-    text, files = [HEAD], {}
-    for case, records in found.items():
-        more, pictures = section(case, records)
-        text += more
-        files |= pictures
-    commits = sorted({record["provenance"]["commit"][:12] for record in used()})
-    text.append(f"Program: {', '.join(commits)}, {RANKS} ranks.\n")
-    return files | {RESULTS / "adaptive.md": "\n".join(text)}
+    return of_cases(RESULTS / "adaptive.md", HEAD, read(), section, RANKS)

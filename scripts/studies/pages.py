@@ -14,6 +14,22 @@ def table(head, rows):
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
 
 
+def of_cases(path, head, found, section, ranks, tail=lambda found: []):
+    """A page with a section for each case that has records, and the files that these draw; `section` gives both. `found` has the
+    records of each case by their keys; what `tail` makes of it stands before the commits that they come from."""
+    found = {case: records for case, records in found.items() if records}
+    if not found:
+        return {}
+    text, files = [head], {}
+    for case, records in found.items():
+        more, pictures = section(case, records)
+        text += more
+        files |= pictures
+    commits = sorted({record["provenance"]["commit"][:12] for records in found.values() for record in records.values()})
+    text += [*tail(found), f"Program: {', '.join(commits)}, {ranks} ranks.\n"]
+    return files | {path: "\n".join(text)}
+
+
 def filled(parts):
     """The README and the pages of docs with their marked parts replaced: texts by the name of the study."""
 

@@ -9,7 +9,7 @@ import typing
 
 from . import measure, plot
 from .measure import RESULTS, Run
-from .pages import table
+from .pages import of_cases, table
 
 RANKS = 2
 RAW = measure.RAW / "precision"
@@ -290,17 +290,10 @@ def used():
     return [record for records in read(RAW).values() for record in records.values()]
 
 
+def missing(found):
+    names = [case for case in CASES if case not in found]
+    return [f"Not measured yet: {', '.join(names)}.\n"] if names else []
+
+
 def pages(folder=RAW):
-    found = {case: records for case, records in read(folder).items() if records}
-    if not found:
-        return {}
-    text, files = [HEAD], {}
-    for case, records in found.items():
-        more, pictures = section(case, records)
-        text += more
-        files |= pictures
-    missing = [case for case in CASES if case not in found]
-    text += [f"Not measured yet: {', '.join(missing)}.\n"] if missing else []
-    commits = sorted({record["provenance"]["commit"][:12] for records in found.values() for record in records.values()})
-    text += [f"Program: {', '.join(commits)}, {RANKS} ranks.\n"]
-    return files | {RESULTS / "precision.md": "\n".join(text)}
+    return of_cases(RESULTS / "precision.md", HEAD, read(folder), section, RANKS, missing)
