@@ -6,6 +6,7 @@ use super::room::make_room;
 use super::{Failure, is_chosen};
 use crate::mesh::SolidMesh;
 use crate::mesh::quality::Quality;
+use crate::model::meshes::Meshes;
 use crate::model::{self, Discrete, ModelError};
 use crate::monitor::Monitor;
 use crate::monitor::events::{Event, Sink};
@@ -15,7 +16,7 @@ use crate::restart::checkpoint::Unfit;
 use crate::results::checkpoint::Checkpoint;
 use crate::scene::{ErrorOf, Scene};
 use crate::sizing::counts::Counted;
-use crate::study::adaptive::error::{Known, estimate};
+use crate::study::adaptive::error::{estimate, is_history};
 use crate::study::adaptive::start::{Start, start};
 use crate::study::adaptive::{Adaptive, marking, parts};
 use crate::study::{Begin, Solved};
@@ -43,12 +44,12 @@ impl Run<'_> {
     ) -> Result<(Discrete, Solved), Failure> {
         let start = start(scene, |name| is_chosen(&plan.source, name)).map_err(Failure::Scene)?;
         start.notes.iter().for_each(|note| monitor.event(&Event::Note(note.clone())));
-        let (mut adaptive, of_meshes) = self.first_meshes(&start, &checkpoint, plan.refinements.len())?;
+        let (mut adaptive, mut meshes) = self.first_meshes(&start, &checkpoint, plan.refinements.len())?;
         let (scene, goal) = (&start.scene, start.scene.solver.error.unwrap_or_default());
         let mut before = None;
         loop {
             let began = self.timer.total_seconds();
-            let found = self.on_mesh(plan, scene, (&adaptive, &of_meshes), checkpoint.take(), monitor);
+            let found = self.on_mesh(plan, scene, (&adaptive, meshes), checkpoint.take(), monitor);
             let (discrete, solved) = match (found, before.take()) {
                 (Ok(found), _) if found.1.summary.converged == Some(true) => found,
                 (Ok((_, failed)), Some(before)) => {
@@ -59,45 +60,51 @@ impl Run<'_> {
                 }
                 (found, _) => return found,
             };
-            plan.refinements.push(self.row(scene, &plan.refinements, (&discrete, &solved), adaptive.unknowns(), began));
-            let row = plan.refinements.last().expect("it was pushed");
+            plan.refinements.push(self.row((&discrete, &solved), adaptive.unknowns(), began));
+            // Files have no infinite numbers.
+            let error = estimate(scene.solver.error_of, &plan.refinements).min(f64::MAX);
+            let row = plan.refinements.last_mut().expect("it was pushed");
+            row.error = error;
             monitor.event(&Event::Refinement { row: row.clone(), goal });
             // An error of the energy is better known when meshes were compared.
             let is_known =
                 plan.refinements.len() > 1 || scene.solver.error_of != ErrorOf::Energy || is_history(&plan.refinements);
-            if row.error <= goal && (is_known || row.error * CLEARLY <= goal) {
+            if error <= goal && (is_known || error * CLEARLY <= goal) {
                 return Ok((discrete, solved));
             }
             let finer = || self.finer(scene, &adaptive, (&discrete, &solved), plan);
             match self.timer.time("refinement of the mesh", finer) {
-                Ok((finer, tight)) => {
-                    adaptive = finer;
+                Ok(finer) => {
+                    let tight;
+                    (adaptive, meshes, tight) = finer;
                     tight.into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
                     before = Some((discrete, solved));
                 }
-                Err(_) if row.error <= goal => return Ok((discrete, solved)),
+                Err(_) if error <= goal => return Ok((discrete, solved)),
                 Err(limit) => return Ok(given_up((discrete, solved), plan, goal, &limit)),
             }
         }
     }
 
-    /// The meshes to begin with, or those of a checkpoint, and what the user should know of them. Collective.
+    /// The meshes to begin with, or those of a checkpoint. Collective.
     fn first_meshes(
         &self,
-        start: &Start,
+        Start { scene, read, .. }: &Start,
         checkpoint: &Option<Checkpoint>,
         refinements: usize,
-    ) -> Result<(Adaptive, Vec<String>), Failure> {
-        let made = self.timer.time("discretisation", || Adaptive::new(start, self.comm)).map_err(ModelError::from);
-        let (mut adaptive, mut of_meshes) = made?;
-        match checkpoint {
-            Some(file) => {
-                let unreadable = |reason| unfit(Unfit::Unreadable(reason));
-                adaptive.repeat(self.comm, file, refinements).map_err(unreadable)?;
-            }
-            None => of_meshes.extend(self.room(&start.scene, &adaptive).map_err(Failure::Memory)?),
+    ) -> Result<(Adaptive, Meshes), Failure> {
+        let made = self.timer.time("discretisation", || Adaptive::new(scene, read, self.comm));
+        let mut adaptive = made.map_err(ModelError::from)?;
+        if let Some(file) = checkpoint {
+            let unreadable = |reason| unfit(Unfit::Unreadable(reason));
+            adaptive.repeat(self.comm, file, refinements).map_err(unreadable)?;
+            let meshes = self.timer.time("discretisation", || adaptive.meshes(scene));
+            return Ok((adaptive, meshes));
         }
-        Ok((adaptive, of_meshes))
+        let (mut meshes, tight) = self.room(scene, &adaptive).map_err(Failure::Memory)?;
+        adaptive.warnings.extend(tight);
+        meshes.warnings.clone_from(&adaptive.warnings);
+        Ok((adaptive, meshes))
     }
 
     /// Solves on the meshes that there are, near the displacement that these have. Collective.
@@ -105,14 +112,12 @@ impl Run<'_> {
         &self,
         plan: &Plan,
         scene: &Scene,
-        (adaptive, of_meshes): (&Adaptive, &[String]),
+        (adaptive, meshes): (&Adaptive, Meshes),
         checkpoint: Option<Checkpoint>,
         monitor: &mut Monitor,
     ) -> Result<(Discrete, Solved), Failure> {
         let (comm, timer) = (self.comm, self.timer);
-        let mut discrete =
-            timer.time("discretisation", || model::discretise_meshes(scene, adaptive.meshes(scene), None, comm))?;
-        discrete.warnings.extend(of_meshes.iter().cloned());
+        let discrete = timer.time("discretisation", || model::discretise_meshes(scene, meshes, None, comm))?;
         let begin = match checkpoint {
             Some(file) => self.at(&discrete, file, monitor)?,
             None if plan.refinements.is_empty() || is_history(&plan.refinements) => Begin::Rest,
@@ -121,22 +126,15 @@ impl Run<'_> {
         self.solve_problem(plan, scene, (discrete, adaptive.arrays()), begin, monitor)
     }
 
-    /// What a solved mesh took, and its error.
-    fn row(
-        &self,
-        scene: &Scene,
-        before: &[RefinementRow],
-        (discrete, solved): (&Discrete, &Solved),
-        unknowns: u64,
-        began: f64,
-    ) -> RefinementRow {
+    /// What a solved mesh took; its error is not known yet.
+    fn row(&self, (discrete, solved): (&Discrete, &Solved), unknowns: u64, began: f64) -> RefinementRow {
         let summary = &solved.summary;
         // Of all increments the largest, as elements have it.
         let largest = |of: fn(&State) -> Option<f64>| {
             let values = summary.steps.iter().filter_map(|step| of(&step.state));
             values.filter(|value| value.is_finite()).reduce(f64::max)
         };
-        let row = RefinementRow {
+        RefinementRow {
             elements: summary.sizes.elements,
             unknowns,
             increments: summary.steps.len() as u64,
@@ -149,22 +147,17 @@ impl Run<'_> {
             newton_iterations: summary.newton_iterations,
             hessian_multiplications: summary.counters.hessian_multiplications,
             seconds: self.timer.total_seconds() - began,
-        };
-        let rows: Vec<RefinementRow> = before.iter().chain([&row]).cloned().collect();
-        let known: Vec<Known> = rows.iter().map(known).collect();
-        // Files have no infinite numbers.
-        let error = estimate(scene.solver.error_of, &known, is_history(&rows)).min(f64::MAX);
-        RefinementRow { error, ..row }
+        }
     }
 
-    /// The next meshes, or the limit that they would be beyond. Collective.
+    /// The next meshes, with a warning where they hardly have room, or the limit that they would be beyond. Collective.
     fn finer(
         &self,
         scene: &Scene,
         adaptive: &Adaptive,
         (discrete, solved): (&Discrete, &Solved),
         plan: &Plan,
-    ) -> Result<(Adaptive, Option<String>), String> {
+    ) -> Result<(Adaptive, Meshes, Option<String>), String> {
         if plan.refinements.len() == MOST {
             return Err(format!("{MOST} meshes did not reach it"));
         }
@@ -184,15 +177,15 @@ impl Run<'_> {
                 return Err("no element has more of it than others".into());
             }
             match self.room(scene, &finer) {
-                Ok(tight) => return Ok((finer, tight)),
+                Ok((meshes, tight)) => return Ok((finer, meshes, tight)),
                 Err(beyond) => limit = beyond,
             }
         }
         Err(limit)
     }
 
-    /// Whether there is room for meshes, or hardly; if not, why. Collective.
-    fn room(&self, scene: &Scene, adaptive: &Adaptive) -> Result<Option<String>, String> {
+    /// The meshes, if there is room for them, and a warning if there hardly is; if not, why. Collective.
+    fn room(&self, scene: &Scene, adaptive: &Adaptive) -> Result<(Meshes, Option<String>), String> {
         let unknowns = adaptive.unknowns();
         if let Some(most) = scene.solver.max_unknowns.filter(|&most| unknowns > most) {
             return Err(format!("the next mesh would have {unknowns} unknowns, and solver.max_unknowns is {most}"));
@@ -205,7 +198,8 @@ impl Run<'_> {
             );
         }
         let counted = Counted::of_meshes(scene, &meshes.bodies);
-        make_room(self.comm, &counted, self.ignore_memory).map_err(|error| error.to_string())
+        let tight = make_room(self.comm, &counted, self.ignore_memory).map_err(|error| error.to_string())?;
+        Ok((meshes, tight))
     }
 }
 
@@ -216,13 +210,4 @@ fn given_up((discrete, mut solved): (Discrete, Solved), plan: &Plan, goal: f64, 
     solved.summary.error =
         Some(format!("the error is about {:.2} %, not {:.2} %: {reason}", 100.0 * found, 100.0 * goal));
     (discrete, solved)
-}
-
-/// Whether a mesh took more than one increment: energies are of steps from different states then.
-fn is_history(rows: &[RefinementRow]) -> bool {
-    rows.iter().any(|row| row.increments > 1)
-}
-
-fn known(&RefinementRow { energy, size, distance, gap, stress, .. }: &RefinementRow) -> Known {
-    Known { energy, size, distance, gap, stress }
 }

@@ -60,10 +60,11 @@ pub enum Cascade {
 
 impl Cascade {
     /// The levels to solve before `level`, coarsest first. None where there is a history, of which a coarser
-    /// level knows the end, or an earlier state, which is of one mesh, or a body that is no brick.
+    /// level knows the end, or an earlier state, which is of one mesh, or a body that is no brick, or meshes are refined.
     pub(super) fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
         let linear = scene.contact.is_empty() && !scene.material.values().any(Law::yields);
-        let possible = scene.step.is_empty() && scene.initial.is_none() && scene.is_of_bricks();
+        let possible =
+            scene.step.is_empty() && scene.initial.is_none() && scene.is_of_bricks() && scene.solver.error.is_none();
         if self == Self::Off || !possible || (self == Self::Auto && linear) {
             return Vec::new();
         }
@@ -91,7 +92,7 @@ pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32,
     source.sets.extend(shorthand("max_unknowns", max_unknowns.map(|n| n.to_string())));
     let found = find(&source, comm)?;
     let scene = found.at_level(source.level, &source.sets)?;
-    let mut levels = if scene.solver.error.is_some() { Vec::new() } else { cascade.before(source.level, &scene) };
+    let mut levels = cascade.before(source.level, &scene);
     levels.push(source.level);
     let plan = Plan { source, levels, yielding: None, rows: Vec::new(), refinements: Vec::new() };
     carry_out(plan, &found, &scene, None, Setting { timer, out, conduct, signals }, comm)

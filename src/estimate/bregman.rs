@@ -13,48 +13,38 @@
 //! It is an estimate, no bound: the recovered strain lies between that of the elements and the exact one where this is singular, so
 //! the distance is too small there; how much so hardly changes from mesh to mesh.
 
-use super::recovery;
-use super::rule::{self, Place};
+use super::{integrals, interpolated, recovery, rule};
 use crate::assembly::Region;
-use crate::assembly::stress::{self, Sample};
+use crate::assembly::stress;
 use crate::assembly::visit::LAW;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
 use crate::material::Law;
+use crate::tensor::Voigt;
 use crate::work;
 
 /// The distance (energy) in each element of each own subdomain. Collective.
 pub fn distances(sums: &NodeSums, regions: &[Region], u: &Torn) -> Vec<Vec<f64>> {
     let subdomains: Vec<&Subdomain> = regions.iter().map(|region| region.subdomain).collect();
     let recovered = recovery::recover(sums, &subdomains, |own| stress::strains(&regions[own], &u[own]));
-    let of = |((region, u), nodal): ((&Region, &Vec<f64>), &Vec<_>)| {
+    let of = |((region, u), nodal): ((&Region, &Vec<f64>), &Vec<Voigt>)| {
         let (elements, rule) = (&region.subdomain.elements, rule::squares(region.subdomain.elements.kind()));
         let points = elements.kind().points();
         work::each(elements.len() * rule.len(), 12 * (elements.kind().nodes() + points) + 2 * LAW, 0);
         let samples = stress::strains(region, u);
-        let of_element = |((index, nodes), samples): ((usize, &[u32]), &[Sample])| {
-            let at = |place: &Place| {
-                let volume: f64 = place.volume.iter().zip(samples).map(|(c, s)| c * s.weight).sum();
-                let (mut strain, mut change) = ([0.0; 6], [0.0; 6]);
-                for (c, sample) in place.samples.iter().zip(samples) {
-                    strain.iter_mut().zip(sample.value).for_each(|(strain, s)| *strain += c * s);
-                }
-                for (&node, value) in nodes.iter().zip(&place.nodes) {
-                    change
-                        .iter_mut()
-                        .zip(nodal[node as usize])
-                        .for_each(|(change, r): (&mut f64, f64)| *change += value * r);
-                }
-                change.iter_mut().zip(strain).for_each(|(change, s)| *change -= s);
-                // The history is that of the nearest point.
-                let nearest = (0..points).max_by(|&a, &b| place.samples[a].total_cmp(&place.samples[b]));
-                let history = region.committed(points * index + nearest.expect("elements have points"));
-                volume * region.material.divergence(&strain, &change, history)
-            };
-            rule.iter().map(at).sum()
-        };
-        elements.iter().enumerate().zip(samples.chunks_exact(points)).map(of_element).collect()
+        integrals(elements, &samples, &rule, |index, nodes, samples, place| {
+            let mut strain = [0.0; 6];
+            for (c, sample) in place.samples.iter().zip(samples) {
+                strain.iter_mut().zip(sample.value).for_each(|(strain, s)| *strain += c * s);
+            }
+            let mut change = interpolated(nodal, nodes, &place.nodes);
+            change.iter_mut().zip(strain).for_each(|(change, s)| *change -= s);
+            // The history is that of the nearest point.
+            let nearest = (0..points).max_by(|&a, &b| place.samples[a].total_cmp(&place.samples[b]));
+            let history = region.committed(points * index + nearest.expect("elements have points"));
+            region.material.divergence(&strain, &change, history)
+        })
     };
     regions.iter().zip(u).zip(&recovered).map(of).collect()
 }

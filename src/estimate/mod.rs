@@ -36,6 +36,7 @@ use crate::decomposition::sums::NodeSums;
 use crate::element::Kind;
 use crate::feti::Torn;
 use crate::material::Law;
+use crate::mesh::Elements;
 use crate::tensor::Voigt;
 use crate::work;
 
@@ -53,14 +54,7 @@ pub fn estimate(sums: &NodeSums, regions: &[Region], u: &Torn) -> Estimate {
     let subdomains: Vec<&Subdomain> = regions.iter().map(|region| region.subdomain).collect();
     // All samples together would take more memory than it takes time to have them twice.
     let recovered = recovery::recover(sums, &subdomains, |own| stress::samples(&regions[own], &u[own]));
-    let at = |own: usize, nodes: &[u32], values: &[f64]| {
-        let mut stress = [0.0; 6];
-        for (&node, value) in nodes.iter().zip(values) {
-            stress.iter_mut().zip(recovered[own][node as usize]).for_each(|(s, r)| *s += value * r);
-        }
-        stress
-    };
-    difference(regions, u, rule::squares, at)
+    difference(regions, u, rule::squares, |own, nodes, values| interpolated(&recovered[own], nodes, values))
 }
 
 /// The error itself, in the same norm, where the exact stress is known: of an own subdomain at a place.
@@ -71,6 +65,33 @@ pub fn error(regions: &[Region], u: &Torn, exact: impl Fn(usize, [f64; 3]) -> Vo
         exact(own, std::array::from_fn(along))
     };
     difference(regions, u, rule::fine, at)
+}
+
+/// What is given at the nodes of a subdomain, between those of an element where shape functions have such values.
+fn interpolated(nodal: &[Voigt], nodes: &[u32], values: &[f64]) -> Voigt {
+    let mut sum = [0.0; 6];
+    for (&node, value) in nodes.iter().zip(values) {
+        sum.iter_mut().zip(nodal[node as usize]).for_each(|(sum, x)| *sum += value * x);
+    }
+    sum
+}
+
+/// The integral over each element of a density, which is told of the number of the element, its nodes, its samples and a place
+/// of the rule.
+fn integrals(
+    elements: &Elements,
+    samples: &[Sample],
+    rule: &[Place],
+    density: impl Fn(usize, &[u32], &[Sample], &Place) -> f64,
+) -> Vec<f64> {
+    let of_element = |(index, (nodes, samples)): (usize, (&[u32], &[Sample]))| {
+        let at = |place: &Place| {
+            let volume: f64 = place.volume.iter().zip(samples).map(|(c, s)| c * s.weight).sum();
+            volume * density(index, nodes, samples, place)
+        };
+        rule.iter().map(at).sum()
+    };
+    elements.iter().zip(samples.chunks_exact(elements.kind().points())).enumerate().map(of_element).collect()
 }
 
 /// How far the stresses at `u` are from others, integrated by a rule: `stress` gives these from the number of an own subdomain, the
@@ -101,18 +122,13 @@ fn squares(region: &Region, samples: &[Sample], rule: &[Place], stress: impl Fn(
     let of_place = 12 * (elements.kind().nodes() + elements.kind().points()) + 30;
     work::each(elements.len() * rule.len(), of_place, 0);
     work::each(samples.len(), 0, size_of::<Sample>());
-    let of_element = |(nodes, samples): (&[u32], &[Sample])| {
-        let at = |place: &Place| {
-            let volume: f64 = place.volume.iter().zip(samples).map(|(c, s)| c * s.weight).sum();
-            let mut difference = stress(nodes, &place.nodes);
-            for (c, sample) in place.samples.iter().zip(samples) {
-                difference.iter_mut().zip(sample.value).for_each(|(d, s)| *d -= c * s);
-            }
-            volume * region.material.hooke().complementary_square(&difference)
-        };
-        rule.iter().map(at).sum()
-    };
-    elements.iter().zip(samples.chunks_exact(elements.kind().points())).map(of_element).collect()
+    integrals(elements, samples, rule, |_, nodes, samples, place| {
+        let mut difference = stress(nodes, &place.nodes);
+        for (c, sample) in place.samples.iter().zip(samples) {
+            difference.iter_mut().zip(sample.value).for_each(|(d, s)| *d -= c * s);
+        }
+        region.material.hooke().complementary_square(&difference)
+    })
 }
 
 #[cfg(test)]

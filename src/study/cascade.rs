@@ -99,10 +99,8 @@ fn mean(values: &HashMap<u64, [f64; 3]>, nodes: &[u64], weights: &[f64]) -> [f64
 
 /// Displacements of all nodes of subdomains, by number.
 pub(super) fn displacements(subdomains: &[Subdomain], u: &Torn) -> impl Iterator<Item = (u64, [f64; 3])> {
-    let of = |(subdomain, u): (&Subdomain, &Vec<f64>)| {
-        subdomain.nodes.iter().copied().zip(u.as_chunks::<3>().0.to_vec()).collect::<Vec<_>>()
-    };
-    subdomains.iter().zip(u).flat_map(of)
+    let each = subdomains.iter().zip(u);
+    each.flat_map(|(subdomain, u)| subdomain.nodes.iter().copied().zip(u.as_chunks::<3>().0.iter().copied()))
 }
 
 /// Vectors of the needed nodes, from whichever rank knows them. Of several who do the lowest rank counts, and of what it knows

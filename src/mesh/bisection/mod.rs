@@ -20,6 +20,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use self::cell::{Cell, Edge};
 use self::register::Register;
 use super::curve::{self, on_grid};
+use super::faces::key;
 use super::marked::forward;
 use super::solid::{Counts, NamedSurface};
 use super::wholes::Wholes;
@@ -60,9 +61,7 @@ impl Refinable {
         let mut on: HashMap<Vec<u32>, Vec<u64>> = HashMap::new();
         for (k, surface) in (0..).zip(&mesh.surfaces) {
             for face in &surface.faces {
-                let mut corners = face[..3].to_vec();
-                corners.sort_unstable();
-                on.entry(corners).or_default().push(k);
+                on.entry(key(&face[..3])).or_default().push(k);
             }
         }
         let mut sets: BTreeSet<Vec<u64>> = on.values().cloned().chain([Vec::new()]).collect();
@@ -77,9 +76,7 @@ impl Refinable {
         }
         let sets: Vec<Vec<u64>> = sets.into_iter().collect();
         let of_face = |corners: [u32; 3]| {
-            let mut corners = corners.to_vec();
-            corners.sort_unstable();
-            let set = on.get(&corners).map_or(&[][..], |set| &set[..]);
+            let set = on.get(&key(&corners)).map_or(&[][..], |set| &set[..]);
             sets.binary_search_by(|other| other[..].cmp(set)).expect("every set is listed") as u32
         };
         let cells = (0..portion.len()).map(|at| Cell::new(portion, mesh.pieces[at], at, &of_face)).collect();

@@ -47,7 +47,7 @@ impl Tag {
         };
         let (p, q) = longest(&[(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]);
         let others: Vec<usize> = (0..4).filter(|k| ![p, q].contains(k)).collect();
-        let order = in_sense([p, q, others[0], others[1]]);
+        let order = in_sense([0, 1, 2, 3], [p, q, others[0], others[1]]);
         // The corner of a face that is not on its longest edge, as a place in the order.
         let mark = |face: [usize; 3]| {
             let [a, b, c] = face.map(|k| order[k]);
@@ -85,8 +85,7 @@ impl Tag {
         let (p, q) = (on[0], on[1]);
         // Positive if the middle takes the place of the other end.
         let base: [usize; 4] = std::array::from_fn(|k| if k == other { MIDDLE } else { k });
-        let straight = [p, q, apart, MIDDLE];
-        let corners = if is_even(base, straight) { straight } else { [p, q, MIDDLE, apart] };
+        let corners = in_sense(base, [p, q, apart, MIDDLE]);
         let within = corners.map(|corner| match corner {
             MIDDLE => Some(other),
             2 => Some(2),
@@ -106,10 +105,10 @@ impl Tag {
     }
 }
 
-/// Corners 0 to 3 in another order, the last two exchanged if that turned a tetrahedron inside out.
-fn in_sense(order: [usize; 4]) -> [usize; 4] {
+/// The corners of a tetrahedron in another order, the last two exchanged if that turned it inside out.
+fn in_sense(corners: [usize; 4], order: [usize; 4]) -> [usize; 4] {
     let [p, q, a, b] = order;
-    if is_even([0, 1, 2, 3], order) { order } else { [p, q, b, a] }
+    if is_even(corners, order) { order } else { [p, q, b, a] }
 }
 
 /// Whether one order of four is an even permutation of the other.

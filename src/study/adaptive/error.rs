@@ -15,6 +15,7 @@
 //!
 //! Of the stress: the estimate of `estimate`, by `SAFETY` larger.
 
+use crate::record::rows::RefinementRow;
 use crate::scene::ErrorOf;
 
 /// Estimated over true errors of the stress are 0.87 and more on refined meshes.
@@ -28,45 +29,35 @@ const LEAST: f64 = 0.5;
 /// Where nothing tells it.
 const UNKNOWN: f64 = 1.5;
 
-/// What is known of the solution on a mesh.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
-    /// `J(u)`.
-    pub energy: f64,
-    /// What errors of it are relative to.
-    pub size: f64,
-    /// Sum of the Bregman distances.
-    pub distance: f64,
-    /// `J(u)` is at most so much above its least value on the mesh.
-    pub gap: f64,
-    /// Estimated relative error of the stress.
-    pub stress: f64,
-}
-
-/// The relative error on the last mesh.
-pub fn estimate(of: ErrorOf, meshes: &[Known], is_history: bool) -> f64 {
+/// The relative error on the last mesh, from the rows of all; its own `error` is not looked at.
+pub fn estimate(of: ErrorOf, meshes: &[RefinementRow]) -> f64 {
     let Some(last) = meshes.last() else { return f64::INFINITY };
     match of {
         ErrorOf::Stress => SAFETY * last.stress,
         ErrorOf::Energy => {
-            let theta = if is_history { UNKNOWN } else { factor(meshes) };
-            let above = (theta * last.distance + last.gap).max(if is_history { 0.0 } else { rise(meshes) });
+            let (theta, least) = if is_history(meshes) { (UNKNOWN, 0.0) } else { (factor(meshes), rise(meshes)) };
+            let above = (theta * last.distance + last.gap).max(least);
             if above == 0.0 { 0.0 } else { above / last.size }
         }
     }
 }
 
+/// Whether a mesh took more than one increment: energies are of steps from different states then.
+pub fn is_history(meshes: &[RefinementRow]) -> bool {
+    meshes.iter().any(|row| row.increments > 1)
+}
+
 /// How far the last mesh raised the energy: shapes or conditions changed, and the error is as large at least.
-fn rise(meshes: &[Known]) -> f64 {
+fn rise(meshes: &[RefinementRow]) -> f64 {
     let [.., before, last] = meshes else { return 0.0 };
     last.energy - before.energy
 }
 
 /// `theta`.
-fn factor(meshes: &[Known]) -> f64 {
-    let Some((fine, coarser)) = meshes.split_last() else { return 1.0 };
-    let tells = |coarse: &&Known| coarse.distance >= APART * fine.distance;
-    let theta = |coarse: &Known| (coarse.energy - fine.energy) / (coarse.distance - fine.distance);
+fn factor(meshes: &[RefinementRow]) -> f64 {
+    let Some((fine, coarser)) = meshes.split_last() else { return UNKNOWN };
+    let tells = |coarse: &&RefinementRow| coarse.distance >= APART * fine.distance;
+    let theta = |coarse: &RefinementRow| (coarse.energy - fine.energy) / (coarse.distance - fine.distance);
     let told = coarser.iter().rev().filter(tells).take(2).map(theta);
     told.reduce(f64::max).unwrap_or(UNKNOWN).max(LEAST)
 }
@@ -75,25 +66,25 @@ fn factor(meshes: &[Known]) -> f64 {
 mod tests {
     use super::*;
 
-    fn known(energy: f64, distance: f64) -> Known {
-        Known { energy, size: energy.abs(), distance, gap: 0.0, stress: 0.1 }
+    fn known(energy: f64, distance: f64) -> RefinementRow {
+        RefinementRow { energy, size: energy.abs(), distance, stress: 0.1, increments: 1, ..RefinementRow::default() }
     }
 
     #[test]
     fn a_constant_factor_is_found_from_two_meshes() {
-        let meshes: Vec<Known> = (0..4).map(|k| 0.5_f64.powi(k)).map(|e| known(-10.0 + e, 2.0 * e)).collect();
-        let error = |count: usize| estimate(ErrorOf::Energy, &meshes[..count], false);
+        let meshes: Vec<RefinementRow> = (0..4).map(|k| 0.5_f64.powi(k)).map(|e| known(-10.0 + e, 2.0 * e)).collect();
+        let error = |count: usize| estimate(ErrorOf::Energy, &meshes[..count]);
         assert_eq!(error(1), UNKNOWN * 2.0 / 9.0);
         for count in 2..=4 {
             let exact = 0.5_f64.powi(count as i32 - 1);
             assert!((error(count) * meshes[count - 1].energy.abs() - exact).abs() < 1e-12);
         }
-        assert!((estimate(ErrorOf::Stress, &meshes, false) - 0.12).abs() < 1e-15);
+        assert!((estimate(ErrorOf::Stress, &meshes) - 0.12).abs() < 1e-15);
     }
 
     #[test]
     fn meshes_that_tell_nothing_are_left_out() {
-        let error = |meshes: &[Known]| estimate(ErrorOf::Energy, meshes, false);
+        let error = |meshes: &[RefinementRow]| estimate(ErrorOf::Energy, meshes);
         // The first mesh saw less than there was.
         assert_eq!(error(&[known(-5.0, 1.0), known(-8.0, 2.0)]), UNKNOWN * 2.0 / 8.0);
         assert_eq!(error(&[known(-5.0, 1.0), known(-8.0, 2.0), known(-9.0, 1.0)]), 1.0 / 9.0);
@@ -103,8 +94,9 @@ mod tests {
         assert_eq!(error(&[known(-6.5, 4.0), known(-7.0, 3.5), known(-9.0, 1.5), known(-9.5, 1.0)]), 1.0 / 9.5);
         assert_eq!(error(&[known(0.0, 9.0), known(-7.0, 4.0), known(-7.0, 4.0), known(-9.5, 1.0)]), 2.5 / 3.0 / 9.5);
         assert_eq!(error(&[known(-7.0, 4.0), known(-6.9, 1.0)]), LEAST / 6.9);
-        assert_eq!(estimate(ErrorOf::Energy, &meshes, true), UNKNOWN / 9.5);
-        assert_eq!(error(&[Known { gap: 0.5, ..known(-5.0, 1.0) }]), (UNKNOWN + 0.5) / 5.0);
+        let history = meshes.map(|row| RefinementRow { increments: 2, ..row });
+        assert_eq!(error(&history), UNKNOWN / 9.5);
+        assert_eq!(error(&[RefinementRow { gap: 0.5, ..known(-5.0, 1.0) }]), (UNKNOWN + 0.5) / 5.0);
         assert_eq!(error(&[known(0.0, 0.0)]), 0.0);
         // What rises cannot be known better than that.
         assert_eq!(error(&[known(-7.0, 1.0), known(-5.0, 0.1)]), 2.0 / 5.0);

@@ -12,7 +12,6 @@ mod tests;
 
 use std::collections::HashSet;
 
-use self::start::Start;
 use super::cascade::{displacements, fetch};
 use super::{Solved, fields};
 use crate::comm::Comm;
@@ -33,17 +32,18 @@ pub type Wanted = Vec<Vec<(Vec<u32>, usize)>>;
 #[derive(Clone)]
 pub struct Adaptive {
     bodies: Vec<Refinable>,
+    /// What the user should know of them.
+    pub warnings: Vec<String>,
     /// What this rank named for each refinement.
     past: Vec<Wanted>,
 }
 
 impl Adaptive {
-    /// The first meshes, and what the user should know of them. Collective.
+    /// The first meshes of a scene, with the elements that mesh files may have ([`start::Start`]). Collective.
     ///
     /// # Errors
     /// If there are none.
-    pub fn new(Start { scene, read, .. }: &Start, comm: &dyn Comm) -> Result<(Self, Vec<String>), MeshError> {
-        let [given, linear] = read;
+    pub fn new(scene: &Scene, [given, linear]: &[Scene; 2], comm: &dyn Comm) -> Result<Self, MeshError> {
         let made = match Meshes::new(given, comm) {
             Err(MeshError::Bad(reason)) if linear != given => {
                 Meshes::new(linear, comm).map_err(|_| MeshError::Bad(reason))
@@ -53,12 +53,13 @@ impl Adaptive {
         let Meshes { solids, warnings, .. } = made?;
         let of = |(body, mesh): (&scene::Body, _)| Refinable::new(comm, mesh, mapped(&body.shape), body.element);
         let bodies = scene.body.values().zip(solids.values()).map(of).collect();
-        Ok((Self { bodies, past: Vec::new() }, warnings))
+        Ok(Self { bodies, warnings, past: Vec::new() })
     }
 
     /// This rank's parts of the meshes.
     pub fn meshes(&self, scene: &Scene) -> Meshes {
-        Meshes::of(scene, self.bodies.iter().map(Refinable::mesh).enumerate().collect())
+        let solids = self.bodies.iter().map(Refinable::mesh).enumerate().collect();
+        Meshes { warnings: self.warnings.clone(), ..Meshes::of(scene, solids) }
     }
 
     /// Unknowns: three a node.

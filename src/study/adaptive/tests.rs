@@ -1,5 +1,5 @@
 use super::marking::{total, wanted};
-use super::start::start;
+use super::start::{Start, start};
 use super::*;
 use crate::comm::threads;
 use crate::element::Kind;
@@ -22,7 +22,7 @@ fn meshes_and_displacements_are_the_same_on_any_ranks_and_again() {
     let scene = &start.scene;
     let found = RANKS.map(|ranks| {
         let of_ranks = threads::run(ranks, |comm| {
-            let (mut adaptive, _) = Adaptive::new(&start, comm).unwrap();
+            let mut adaptive = Adaptive::new(scene, &start.read, comm).unwrap();
             let begin = adaptive.unknowns();
             let mut torn = Vec::new();
             for _ in 0..2 {
