@@ -2,6 +2,7 @@
 //!
 //! Every function works on one [`Region`]; nothing here communicates. All of them go through the elements by [`visit`].
 
+pub mod dissipation;
 pub mod flow;
 pub mod gradients;
 pub mod internal;

@@ -60,7 +60,12 @@ impl Run<'_> {
                 }
                 (found, _) => return found,
             };
-            plan.refinements.push(self.row((&discrete, &solved), adaptive.unknowns(), began));
+            plan.refinements.push(self.row(
+                (&discrete, &solved),
+                adaptive.unknowns(),
+                plan.refinements.is_empty(),
+                began,
+            ));
             // Files have no infinite numbers.
             let error = estimate(scene.solver.error_of, &plan.refinements).min(f64::MAX);
             let row = plan.refinements.last_mut().expect("it was pushed");
@@ -121,29 +126,55 @@ impl Run<'_> {
         let begin = match checkpoint {
             Some(file) => self.at(&discrete, file, monitor)?,
             None if plan.refinements.is_empty() || is_history(&plan.refinements) => Begin::Rest,
-            None => Begin::Around(timer.time("interpolation", || adaptive.displacement(comm, &discrete))),
+            None => {
+                let limit = plan.refinements.last().and_then(|row| row.limit_load);
+                Begin::Around(timer.time("interpolation", || adaptive.displacement(comm, &discrete)), limit)
+            }
         };
         self.solve_problem(plan, scene, (discrete, adaptive.arrays()), begin, monitor)
     }
 
     /// What a solved mesh took; its error is not known yet.
-    fn row(&self, (discrete, solved): (&Discrete, &Solved), unknowns: u64, began: f64) -> RefinementRow {
+    fn row(
+        &self,
+        (discrete, solved): (&Discrete, &Solved),
+        unknowns: u64,
+        is_first: bool,
+        began: f64,
+    ) -> RefinementRow {
         let summary = &solved.summary;
+        // Equilibria on the way to a limit load compare where they did the same work: at the end of the first mesh, which is where
+        // others begin.
+        let steps = match &summary.steps[..] {
+            [.., last] if summary.limit_load.is_some() && is_first => std::slice::from_ref(last),
+            [first, ..] if summary.limit_load.is_some() => std::slice::from_ref(first),
+            all => all,
+        };
+        let limit_load = steps.last().and_then(|row| row.limit_load);
+        let of_limit = limit_load.map_or(0.0, |limit| limit.factor * limit.work);
         // Of all increments the largest, as elements have it.
         let largest = |of: fn(&State) -> Option<f64>| {
-            let values = summary.steps.iter().filter_map(|step| of(&step.state));
+            let values = steps.iter().filter_map(|step| of(&step.state));
             values.filter(|value| value.is_finite()).reduce(f64::max)
         };
+        let energy =
+            steps.last().and_then(|row| row.state.energy).filter(|energy| energy.is_finite()).unwrap_or_default()
+                + of_limit;
         RefinementRow {
             elements: summary.sizes.elements,
             unknowns,
             increments: summary.steps.len() as u64,
             error: f64::MAX,
-            energy: summary.state.energy.filter(|energy| energy.is_finite()).unwrap_or_default(),
-            size: largest(|state| state.energy.map(f64::abs)).unwrap_or_default(),
+            energy,
+            size: if limit_load.is_some() {
+                energy.abs()
+            } else {
+                largest(|state| state.energy.map(f64::abs)).unwrap_or_default()
+            },
             distance: marking::total(self.comm, &parts(discrete, solved, ErrorOf::Energy)),
             gap: largest(|state| state.errors.duality_gap).unwrap_or_default(),
             stress: largest(|state| state.errors.discretisation).unwrap_or(f64::MAX),
+            limit_load,
             newton_iterations: summary.newton_iterations,
             hessian_multiplications: summary.counters.hessian_multiplications,
             seconds: self.timer.total_seconds() - began,

@@ -40,6 +40,9 @@ pub struct Solve {
     /// Refined meshes have so many unknowns at most. Short for --set solver.max_unknowns=...
     #[arg(long, value_name = "N")]
     max_unknowns: Option<u64>,
+    /// Find the limit load, to 1 % or so near: 0.01 or 1%. Short for --set limit.tolerance=...
+    #[arg(long, value_name = "X", value_parser = values::error, num_args = 0..=1, default_missing_value = "1%", require_equals = true)]
+    limit: Option<String>,
     /// Solve half the level first, and so on, and start from there: auto (where it pays), on or off.
     #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
     cascade: Cascade,
@@ -60,11 +63,12 @@ pub enum Cascade {
 
 impl Cascade {
     /// The levels to solve before `level`, coarsest first. None where there is a history, of which a coarser
-    /// level knows the end, or an earlier state, which is of one mesh, or a body that is no brick, or meshes are refined.
+    /// level knows the end, or an earlier state, which is of one mesh, or a body that is no brick, or meshes are refined,
+    /// or a limit load, which has its own start.
     pub(super) fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
         let linear = scene.contact.is_empty() && !scene.material.values().any(Law::yields);
-        let possible =
-            scene.step.is_empty() && scene.initial.is_none() && scene.is_of_bricks() && scene.solver.error.is_none();
+        let has_history = !scene.step.is_empty() || scene.initial.is_some() || scene.limit.is_some();
+        let possible = !has_history && scene.is_of_bricks() && scene.solver.error.is_none();
         if self == Self::Off || !possible || (self == Self::Auto && linear) {
             return Vec::new();
         }
@@ -81,7 +85,7 @@ impl Cascade {
 /// If the scene is bad or files cannot be read or written.
 pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32, Failure> {
     let timer = Timer::start();
-    let Solve { mut source, out, qp, preconditioner, accuracy, error, error_of, max_unknowns, cascade, conduct } =
+    let Solve { mut source, out, qp, preconditioner, accuracy, error, error_of, max_unknowns, limit, cascade, conduct } =
         arguments;
     let shorthand = |key: &str, value: Option<String>| value.map(|v| format!("solver.{key}={v}"));
     source.sets.extend(shorthand("qp", qp));
@@ -90,6 +94,7 @@ pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32,
     source.sets.extend(shorthand("error", error));
     source.sets.extend(shorthand("error_of", error_of));
     source.sets.extend(shorthand("max_unknowns", max_unknowns.map(|n| n.to_string())));
+    source.sets.extend(limit.map(|tolerance| format!("limit.tolerance={tolerance}")));
     let found = find(&source, comm)?;
     let scene = found.at_level(source.level, &source.sets)?;
     let mut levels = cascade.before(source.level, &scene);

@@ -75,6 +75,15 @@ pub trait Law {
     /// The least that tangents are of the elastic stiffness; 1 for an elastic material.
     fn least_tangent(&self) -> f64;
 
+    /// The law with more hardening, if needed: tangents are at least this share of the elastic stiffness. Elastic ones stay.
+    fn firmer(&self, least_tangent: f64) -> Self
+    where
+        Self: Sized;
+
+    /// The most power that a stress without volumetric part can have on a strain rate, per volume; `None` where nothing limits it:
+    /// in an elastic material, and in one that hardens.
+    fn dissipation(&self, rate: &Voigt) -> Option<f64>;
+
     /// The state at the end of the step, to be committed once the load step has converged.
     fn commit(&self, strain: &Voigt, committed: &Self::State) -> Self::State;
 }

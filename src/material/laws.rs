@@ -63,6 +63,15 @@ macro_rules! laws {
                 match self { $(Self::$law(law) => law.least_tangent(),)+ }
             }
 
+            fn firmer(&self, least_tangent: f64) -> Self {
+                match self { $(Self::$law(law) => Self::$law(law.firmer(least_tangent)),)+ }
+            }
+
+            #[inline]
+            fn dissipation(&self, rate: &Voigt) -> Option<f64> {
+                match self { $(Self::$law(law) => law.dissipation(rate),)+ }
+            }
+
             #[inline]
             fn commit(&self, strain: &Voigt, committed: &History) -> History {
                 let mut history = *committed;

@@ -309,6 +309,20 @@ impl Law for VonMises {
         }
     }
 
+    fn firmer(&self, least_tangent: f64) -> Self {
+        let least = least_tangent / (1.0 - least_tangent) * 3.0 * self.hooke().shear_modulus();
+        let missing = (least - self.hardening - self.kinematic_hardening).max(0.0);
+        Self { hardening: self.hardening + if self.yields() { missing } else { 0.0 }, ..*self }
+    }
+
+    /// sqrt(2/3) sigma_y |dev rate|.
+    fn dissipation(&self, rate: &Voigt) -> Option<f64> {
+        let s = self.deviatoric_stress(rate);
+        self.yield_stress
+            .filter(|_| self.has_limit())
+            .map(|stress| stress * equivalent(&s) / (3.0 * self.hooke().shear_modulus()))
+    }
+
     fn commit(&self, strain: &Voigt, committed: &PlasticState) -> PlasticState {
         let trial = Trial::new(self, strain, committed);
         if trial.step == 0.0 {

@@ -43,21 +43,29 @@ impl Conditions {
 /// What is prescribed at the beginning, and the stages from there; `zeros` are those of a torn vector.
 pub fn stages(scene: &Scene, discrete: &Discrete, zeros: &dyn Fn() -> Torn) -> (Conditions, Vec<Stage>) {
     let RightHandSides { begin, ends } = &discrete.right_hand_sides;
-    let loads = |factor: &dyn Fn(&str) -> f64| {
-        let scaled = |(load, name): (&Load, &String)| load.times(factor(name));
-        let scaled: Vec<Load> = discrete.loads.iter().zip(scene.load.keys()).map(scaled).collect();
-        let mut loads = zeros();
-        for (subdomain, f) in discrete.decomposition.subdomains.iter().zip(&mut loads) {
-            loads::add(subdomain, &scaled, f);
-        }
-        loads
-    };
     let stages = scene.steps().iter().zip(ends).map(|(step, rhs)| Stage {
-        end: Conditions { loads: loads(&|name| step.of_load(name)), rhs: rhs.clone() },
+        end: Conditions { loads: loads(scene, discrete, zeros, &|name| step.of_load(name)), rhs: rhs.clone() },
         increments: step.increments,
         halvings: step.halvings,
     });
     (Conditions { loads: zeros(), rhs: begin.clone() }, stages.collect())
+}
+
+/// The loads that grow to their limit, if the scene asks for it.
+pub fn growing(scene: &Scene, discrete: &Discrete, zeros: &dyn Fn() -> Torn) -> Option<Torn> {
+    let limit = scene.limit.as_ref()?;
+    Some(loads(scene, discrete, zeros, &|name| if limit.grows(name) { 1.0 } else { 0.0 }))
+}
+
+/// All loads, each by its factor.
+fn loads(scene: &Scene, discrete: &Discrete, zeros: &dyn Fn() -> Torn, factor: &dyn Fn(&str) -> f64) -> Torn {
+    let scaled = |(load, name): (&Load, &String)| load.times(factor(name));
+    let scaled: Vec<Load> = discrete.loads.iter().zip(scene.load.keys()).map(scaled).collect();
+    let mut loads = zeros();
+    for (subdomain, f) in discrete.decomposition.subdomains.iter().zip(&mut loads) {
+        loads::add(subdomain, &scaled, f);
+    }
+    loads
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::table::PhaseTable;
 use crate::record::counts::{ContactRow, Sizes};
 use crate::record::forecast::{Forecast, HeldRow};
-use crate::record::rows::{NewtonRow, RefinementRow};
+use crate::record::rows::{LimitLoad, NewtonRow, RefinementRow};
 use crate::record::state::{Errors, Residuals};
 
 /// Something that happened and is worth telling; numbers are those of all ranks together.
@@ -64,6 +64,8 @@ pub enum Event {
         /// The error that is wanted.
         goal: f64,
     },
+    /// What is known of the limit load.
+    Limit(LimitLoad),
     /// A Newton step is done.
     NewtonStep(NewtonRow),
     /// Something the user should know.

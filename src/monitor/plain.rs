@@ -7,7 +7,7 @@ use super::events::{Event, Sink};
 use super::table::{Phase, PhaseTable, Spread};
 use crate::record::counts::{ContactRow, Counted, Sizes, Work};
 use crate::record::forecast::{Forecast, HeldRow};
-use crate::record::rows::{NewtonRow, RefinementRow};
+use crate::record::rows::{LimitLoad, NewtonRow, RefinementRow};
 use crate::record::state::{Errors, Residuals};
 
 /// Writes log lines.
@@ -51,6 +51,7 @@ impl Plain {
             }
             Event::Increment(text) | Event::Note(text) => vec![text.clone()],
             Event::Refinement { row, goal } => vec![refinement_line(row, *goal)],
+            Event::Limit(bounds) => vec![limit_line(*bounds)],
             Event::Phases(table) => phase_lines(table),
             Event::Residuals(residuals) => residual_lines(residuals),
             Event::Errors(errors) => error_line(errors).into_iter().collect(),
@@ -127,6 +128,11 @@ fn refinement_line(row: &RefinementRow, goal: f64) -> String {
         100.0 * error,
         100.0 * goal
     )
+}
+
+fn limit_line(bounds: LimitLoad) -> String {
+    let LimitLoad { lower, upper, .. } = bounds;
+    format!("limit load factor between {lower:.6} and {upper:.6}, {:.2} % apart", 100.0 * bounds.width())
 }
 
 fn newton_header() -> String {

@@ -6,14 +6,15 @@
 
 use std::mem::{replace, take};
 
+use super::control::{Control, firm};
 use super::damping::{self, Damped};
 use super::errors::Errors;
 use super::forcing::{self, Forcing};
-use super::outcome::{Outcome, StepRecord};
+use super::outcome::{Next, Outcome, StepRecord};
 use super::path::{At, Attempt, Path};
 use super::problem::{State, TornProblem};
 use super::residuals::Residuals;
-use super::snapshot::{Reached, Snapshot};
+use super::snapshot::{Begin, Reached, Snapshot};
 use super::step::{SolverState, Step, StepSolver};
 use crate::feti::Torn;
 use crate::model::history::{Conditions, Stage};
@@ -36,24 +37,6 @@ pub struct Settings {
     pub accuracy: Option<f64>,
 }
 
-/// How a history begins.
-pub enum Begin {
-    /// From rest.
-    Rest,
-    /// Near the solution of the first increment.
-    Near(Start),
-    /// Where another one stood, whose conditions it shares.
-    At(Box<Snapshot>),
-}
-
-/// Where to start from.
-pub struct Start {
-    /// Torn displacement.
-    pub u: Torn,
-    /// Rows that are kept there: all equalities and the closed contacts.
-    pub kept: Vec<bool>,
-}
-
 /// A displacement with its multipliers, and what is known of both.
 pub struct Iterate {
     /// Torn displacement; after a step copies agree and the bodies do not overlap, to round-off.
@@ -70,17 +53,6 @@ pub struct Iterate {
     pub ended_by_accuracy: bool,
 }
 
-/// What [`Newton::advance`] did.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Next {
-    /// The next increment, or part of one, is to be tried.
-    Increment,
-    /// The attempt that led there failed like this; its first half is to be tried.
-    Half(At, Outcome),
-    /// The history is over: all of it was reached, or it was given up.
-    End,
-}
-
 /// What became of the trial of a step.
 enum Trial {
     Accepted(Step, Damped),
@@ -91,50 +63,75 @@ enum Trial {
 
 /// Newton's method on its way through a history of loads.
 pub struct Newton<'a> {
-    problem: TornProblem<'a>,
-    solver: StepSolver<'a>,
+    pub(super) problem: TornProblem<'a>,
+    pub(super) solver: StepSolver<'a>,
     settings: Settings,
     path: Path,
     attempt: Attempt,
-    iterate: Iterate,
+    pub(super) iterate: Iterate,
     /// Whether the iterate is admissible: only then `J` may not grow.
-    admissible: bool,
-    forcing: Forcing,
-    outcome: Option<Outcome>,
-    reached: Option<Reached>,
-    steps: Vec<(usize, StepRecord)>,
+    pub(super) admissible: bool,
+    pub(super) forcing: Forcing,
+    pub(super) outcome: Option<Outcome>,
+    pub(super) reached: Option<Reached>,
+    pub(super) steps: Vec<(usize, StepRecord)>,
     /// Steps of attempts before this one.
-    before: usize,
+    pub(super) before: usize,
+    /// What the loads follow, if not the path.
+    pub(super) control: Option<Control>,
 }
 
 impl<'a> Newton<'a> {
-    /// A history through these stages, at least one; `problem` comes with what is prescribed at the beginning. Collective.
+    /// A history through these stages, at least one; `problem` comes with what is prescribed at the beginning. Loads `along` follow
+    /// the work they do. Collective.
     pub fn new(
         mut problem: TornProblem<'a>,
         mut solver: StepSolver<'a>,
         settings: Settings,
-        stages: Vec<Stage>,
+        (stages, along): (Vec<Stage>, Option<Torn>),
         begin: Begin,
         timer: &Timer,
     ) -> Self {
         let path = Path { begin: Conditions { loads: take(&mut problem.loads), rhs: take(&mut problem.rhs) }, stages };
         let rest = |problem: &TornProblem| (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
         let (mut attempt, mut forcing) = (Attempt::FIRST, Forcing::default());
-        let (mut reached, mut steps, mut before, mut stood) = (None, Vec::new(), 0, None);
+        let (mut reached, mut steps, mut before, mut stood, mut reach) = (None, Vec::new(), 0, None, None);
         let ((u, lambda), kept) = match begin {
             Begin::Rest => (rest(&problem), None),
-            Begin::Near(start) => ((start.u, rest(&problem).1), Some(start.kept)),
+            Begin::Near(start) => {
+                reach = start.reach;
+                ((start.u, rest(&problem).1), Some(start.kept))
+            }
             Begin::At(snapshot) => {
                 (attempt, forcing, reached) = (snapshot.attempt, snapshot.forcing, snapshot.reached);
-                (steps, before, stood) = (snapshot.steps, snapshot.before, Some(snapshot.solver));
+                (steps, before, stood, reach) =
+                    (snapshot.steps, snapshot.before, Some(snapshot.solver), snapshot.reach);
                 problem.committed = snapshot.committed;
                 ((snapshot.u, snapshot.lambda), snapshot.kept)
             }
         };
         Conditions { loads: problem.loads, rhs: problem.rhs } = path.conditions(attempt);
+        let control = along.map(|along| Control::new(&problem.loads, along, reach));
+        if let Some(control) = &control {
+            (problem.loads, problem.firm) = (control.loads(), firm(&problem.materials));
+        }
         let (iterate, outcome) = first_iterate(&problem, &mut solver, (u, lambda), kept, stood, timer);
         let admissible = before < steps.len() || problem.is_admissible(&iterate.u);
-        Self { problem, solver, settings, path, attempt, iterate, admissible, forcing, outcome, reached, steps, before }
+        Self {
+            problem,
+            solver,
+            settings,
+            path,
+            attempt,
+            iterate,
+            admissible,
+            forcing,
+            outcome,
+            reached,
+            steps,
+            before,
+            control,
+        }
     }
 
     /// All that the rest depends on.
@@ -150,6 +147,7 @@ impl<'a> Newton<'a> {
             kept: None,
             forcing: self.forcing,
             solver: self.solver.state(),
+            reach: self.control.as_ref().map(|control| control.reach),
         }
     }
 
@@ -165,7 +163,7 @@ impl<'a> Newton<'a> {
 
     /// Where the present attempt leads.
     pub fn at(&self) -> At {
-        self.path.at(self.attempt)
+        self.control.as_ref().map_or(self.path.at(self.attempt), Control::at)
     }
 
     /// How the iteration of the present attempt ended; `None` while it goes on.
@@ -230,7 +228,7 @@ impl<'a> Newton<'a> {
 
     /// Tries a step: solves the quadratic program of the tangents at the iterate, and looks for a length that lowers `J`.
     fn trial(&mut self, refused: &[Step], timer: &Timer, alive: &dyn Fn(usize, usize)) -> Trial {
-        let Self { problem, solver, iterate, forcing, steps, .. } = self;
+        let Self { problem, solver, iterate, forcing, steps, control, .. } = self;
         let own = &steps[self.before..];
         // Where rounding spoiled the last step factors have to be in double precision.
         if own.last().is_some_and(|(_, step)| step.local_residual > forcing::LOOSEST) {
@@ -243,7 +241,7 @@ impl<'a> Newton<'a> {
         let number = own.len() + 1;
         let at = (&iterate.u, &iterate.state);
         let last = refused.last().map_or(&iterate.lambda, |trial| &trial.lambda);
-        let step = match solver
+        let mut step = match solver
             .solve(problem, at, last, (*forcing, goes_on), timer, &|applications| alive(number, applications))
         {
             Ok(step) => step,
@@ -258,8 +256,15 @@ impl<'a> Newton<'a> {
             qp::Outcome::NotFinite => return Trial::Ended(Outcome::NotFinite),
             outcome => return Trial::Ended(Outcome::Inner(outcome)),
         }
+        let drop = forcing.drop;
+        if let Some(control) = control
+            && let Err(outcome) =
+                control.steer(problem, solver, (&iterate.u, &mut iterate.state), (&mut step, drop), timer)
+        {
+            return Trial::Ended(outcome);
+        }
         // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
-        match damping::search(problem, at.0, at.1, &step.du, self.admissible, timer) {
+        match damping::search(problem, &iterate.u, &iterate.state, &step.du, self.admissible, timer) {
             Some(damped) => Trial::Accepted(step, damped),
             None if !iterate.state.energy.is_finite() => Trial::Ended(Outcome::NotFinite),
             None if refused.len() >= TRIALS => Trial::Ended(Outcome::Stalled),
@@ -363,7 +368,7 @@ impl<'a> Newton<'a> {
 
 /// The first iterate of an attempt, and how the iteration ended if it cannot even begin. With a state of the solver, goes on
 /// from there; if rows are known to hold, with the multipliers that follow from them. Collective.
-fn first_iterate(
+pub(super) fn first_iterate(
     problem: &TornProblem,
     solver: &mut StepSolver,
     (u, mut lambda): (Torn, Vec<f64>),

@@ -13,24 +13,28 @@ pub mod balance;
 pub mod certificate;
 mod commit;
 pub mod committed;
+pub mod control;
 pub mod damping;
 pub mod dual;
 pub mod errors;
 pub mod forcing;
 pub mod iteration;
+pub mod limit;
 pub mod outcome;
 pub mod path;
 pub mod problem;
 pub mod program;
 pub mod residuals;
+pub mod response;
 pub mod snapshot;
 pub mod step;
 
-pub use iteration::{Begin, Iterate, Newton, Next, Settings, Start};
-pub use outcome::{Outcome, StepRecord};
+pub use iteration::{Iterate, Newton, Settings};
+pub use limit::Bounds;
+pub use outcome::{Next, Outcome, StepRecord};
 pub use problem::TornProblem;
 pub use program::ProgramSettings;
-pub use snapshot::Snapshot;
+pub use snapshot::{Begin, Snapshot, Start};
 pub use step::{SolverState, StepSolver};
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::path::At;
 use crate::qp;
 
 /// How the iteration for an increment ended.
@@ -17,6 +18,10 @@ pub enum Outcome {
     NotFinite,
     /// The quadratic program of a step could not be solved.
     Inner(qp::Outcome),
+    /// Loads that are to follow the work they do, do none.
+    Idle,
+    /// Loads grew far beyond what a limit needs, without one.
+    Unlimited,
     /// A tangent stiffness is singular beyond its rigid motions.
     Singular(String),
 }
@@ -36,9 +41,24 @@ impl Outcome {
                 "a quadratic program reached solver.qp_limit without convergence".into()
             }
             Self::Inner(outcome) => format!("a quadratic program could not be solved ({outcome:?})"),
+            Self::Idle => "the loads of [limit] move nothing, or nothing that yields without hardening".into(),
+            Self::Unlimited => {
+                "loads that grow are borne without a limit: perhaps by elastic or hardening parts, or by linear elements, which lock".into()
+            }
             Self::Singular(message) => message.clone(),
         })
     }
+}
+
+/// What [`super::Newton::advance`] did.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Next {
+    /// The next increment, or part of one, is to be tried.
+    Increment,
+    /// The attempt that led there failed like this; its first half is to be tried.
+    Half(At, Outcome),
+    /// The history is over: all of it was reached, or it was given up.
+    End,
 }
 
 /// What one step did.

@@ -26,6 +26,8 @@ pub struct TornProblem<'a> {
     pub subdomains: &'a [Subdomain],
     /// Material of each own subdomain.
     pub materials: Vec<Material>,
+    /// The same as tangents take it: where loads are near their limit these must not vanish.
+    pub firm: Vec<Material>,
     /// Rigid modes of each own subdomain's cluster.
     pub modes: &'a [RigidModes],
     /// `f`: nodal forces.
@@ -81,9 +83,11 @@ impl<'a> TornProblem<'a> {
         let Discrete { materials, constraints, bodies, .. } = discrete;
         let subdomains = &discrete.decomposition.subdomains[..];
         let yields = |&material: &usize| materials[material].yields();
+        let of_subdomains: Vec<Material> = subdomains.iter().map(|s| materials[s.material]).collect();
         Self {
             subdomains,
-            materials: subdomains.iter().map(|s| materials[s.material]).collect(),
+            firm: of_subdomains.clone(),
+            materials: of_subdomains,
             modes: connection.modes(),
             loads,
             rhs,
@@ -108,6 +112,11 @@ impl TornProblem<'_> {
     pub fn region(&self, own: usize) -> Region<'_> {
         let (subdomain, material) = (&self.subdomains[own], &self.materials[own]);
         Region { subdomain, material, history: self.committed.history(own) }
+    }
+
+    /// Own subdomains as their tangents are made.
+    pub fn firm_regions(&self) -> Vec<Region<'_>> {
+        self.regions().into_iter().zip(&self.firm).map(|(region, material)| Region { material, ..region }).collect()
     }
 
     /// Without plastic material, one step solves the problem.
@@ -181,7 +190,18 @@ impl TornProblem<'_> {
 
     /// Adds `B'x` to a displacement that makes it admissible. Where rows are orthogonal that is the projection.
     pub fn make_admissible(&self, u: &mut Torn) {
-        let slack = self.slack(u);
+        self.close(self.slack(u), u);
+    }
+
+    /// The same for a velocity: supports are at rest, and closed gaps may open.
+    pub fn make_admissible_velocity(&self, v: &mut Torn) {
+        let mut slack = vec![0.0; self.gather.rows()];
+        self.gather.apply(v, &mut slack);
+        slack.iter_mut().for_each(|s| *s = -*s);
+        self.close(slack, v);
+    }
+
+    fn close(&self, slack: Vec<f64>, u: &mut Torn) {
         let mut correction = slack.clone();
         self.constraints.laws().violation(&mut correction);
         self.coupling.borrow_mut().close(self.constraints, &slack, &mut correction);

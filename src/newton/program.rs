@@ -54,6 +54,13 @@ pub struct Rest {
     spent: usize,
 }
 
+impl Rest {
+    /// The directions that it knows.
+    pub fn into_directions(self) -> Directions {
+        self.directions
+    }
+}
+
 /// What later programs depend on, beside the last multipliers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProgramState {
@@ -98,6 +105,11 @@ impl Programs {
         if let Some(kept) = state.kept {
             self.expect(coarse, kept);
         }
+    }
+
+    /// Products with the Hessian that one program may take.
+    pub fn products(&self) -> usize {
+        self.settings.products
     }
 
     /// Another solve follows.
@@ -193,20 +205,43 @@ impl Programs {
         problem: &TornProblem,
         dual: Dual,
         resultants: &[f64],
-        Rest { start: mut lambda, mut residual, directions, spent }: Rest,
+        from: Rest,
         limits: Limits,
     ) -> DualSolution {
+        let (mut found, first_norm) = self.on_face((problem, dual, resultants), from, None, limits);
+        found.at_floor = self.note(&limits, first_norm);
+        found
+    }
+
+    /// Solves the program on the rows that the last one kept, all of them equalities. Directions that are `known` to be conjugate in
+    /// the same `F` go first; tolerances refer to the residual before them. Returns the norm of the first projected residual as
+    /// well. Collective.
+    pub(super) fn on_face(
+        &mut self,
+        (problem, dual, resultants): (&TornProblem, Dual, &[f64]),
+        Rest { start: mut lambda, mut residual, mut directions, spent }: Rest,
+        known: Option<Directions>,
+        mut limits: Limits,
+    ) -> (DualSolution, f64) {
         let space = Multipliers(problem.space, dual.timer);
         let rows = dual.timer.time("coarse set-up", || self.take_face(dual.coarse, lambda.len()));
         let mut face = DualFace { dual, constraints: problem.constraints, resultants, rows };
+        if let Some(known) = known {
+            let mut projected = residual.clone();
+            face.project(&mut projected);
+            limits.reference = Some(space.norm(&projected));
+            known.descend(&space, &mut lambda, &mut residual);
+            directions = known;
+        }
         let mut solver = Pcpg::with(&space, directions);
         let report = solver.solve(&mut face, &mut lambda, &mut residual, &limits);
         let spent = spent + report.statistics.hessian;
         let rest = Rest { start: lambda.clone(), residual, directions: solver.into_directions(), spent };
         self.face = Some(face.rows);
-        let at_floor = self.note(&limits, report.first_norm);
         let (outcome, statistics) = (report.outcome, report.statistics);
-        DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor, rest: Some(rest) }
+        let found =
+            DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor: false, rest: Some(rest) };
+        (found, report.first_norm)
     }
 
     fn active_set(

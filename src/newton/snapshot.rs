@@ -1,6 +1,7 @@
 //! Where a history of loads stands between two Newton steps: all that the rest of it depends on, beside the problem.
 
 use super::committed::Committed;
+use super::control::Reach;
 use super::forcing::Forcing;
 use super::outcome::StepRecord;
 use super::path::Attempt;
@@ -31,6 +32,8 @@ pub struct Snapshot {
     pub forcing: Forcing,
     /// What the solver of the steps keeps.
     pub solver: SolverState,
+    /// Where loads are that follow the work they do.
+    pub reach: Option<Reach>,
 }
 
 /// The end of an increment.
@@ -40,4 +43,24 @@ pub struct Reached {
     pub u: Torn,
     /// Multipliers of this rank's rows.
     pub lambda: Vec<f64>,
+}
+
+/// How a history begins.
+pub enum Begin {
+    /// From rest.
+    Rest,
+    /// Near the solution of the first increment.
+    Near(Start),
+    /// Where another one stood, whose conditions it shares.
+    At(Box<Snapshot>),
+}
+
+/// Where to start from.
+pub struct Start {
+    /// Torn displacement.
+    pub u: Torn,
+    /// Rows that are kept there: all equalities and the closed contacts.
+    pub kept: Vec<bool>,
+    /// Where loads are that follow the work they do.
+    pub reach: Option<Reach>,
 }

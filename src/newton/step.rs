@@ -13,7 +13,7 @@ use std::sync::Arc;
 use super::dual::Dual;
 use super::forcing::{Forcing, TIGHTEST};
 use super::problem::{State, TornProblem};
-use super::program::{DualSolution, ProgramSettings, ProgramState, Programs};
+use super::program::{DualSolution, ProgramSettings, ProgramState, Programs, Rest};
 use crate::assembly::flow::{self, Flow};
 use crate::assembly::internal;
 use crate::feti::Torn;
@@ -26,6 +26,7 @@ use crate::feti::inverse::factor::NotDefinite;
 use crate::feti::inverse::tangents::Linearisation;
 use crate::feti::preconditioner::Preconditioner;
 use crate::monitor::timing::Timer;
+use crate::qp::pcpg::Directions;
 use crate::qp::{Outcome, Statistics};
 use crate::sparse::cholesky::Precision;
 
@@ -52,6 +53,8 @@ pub struct Step {
     pub applications: usize,
     /// Subdomains with a new factor, over all ranks; those that share one count, too.
     pub factorisations: usize,
+    /// What its program knows of F; nothing after SMALSE-M.
+    pub directions: Directions,
 }
 
 /// What later steps depend on, beside the multipliers.
@@ -71,7 +74,7 @@ pub struct SolverState {
 pub struct StepSolver<'a> {
     pub(super) operator: DualOperator<'a>,
     pub(super) coarse: Coarse<'a>,
-    preconditioner: Option<Preconditioner<'a>>,
+    pub(super) preconditioner: Option<Preconditioner<'a>>,
     pub(super) programs: Programs,
     /// Directions of flow in each own subdomain.
     flows: Vec<Flow>,
@@ -105,7 +108,8 @@ impl<'a> StepSolver<'a> {
         self.flows = flows;
         self.programs.resume(&self.coarse, programs);
         let interiors = self.preconditioner.as_mut().map(Preconditioner::interiors);
-        let outcome = self.operator.remake(&problem.regions(), (precision, bases), interiors, problem.space, timer);
+        let outcome =
+            self.operator.remake(&problem.firm_regions(), (precision, bases), interiors, problem.space, timer);
         outcome.map_err(|singular| singular.to_string())
     }
 
@@ -195,7 +199,7 @@ impl<'a> StepSolver<'a> {
         residual.iter_mut().zip(&open).for_each(|(r, c)| *r -= c);
         let (mut from, mut forcing) = (Programs::from(lambda, residual), forcing);
         let (mut statistics, mut is_exact) = (Statistics::default(), false);
-        let (found, recovered) = loop {
+        let (found, recovered, rest) = loop {
             let dual = Dual {
                 operator: &mut self.operator,
                 coarse: &self.coarse,
@@ -222,7 +226,7 @@ impl<'a> StepSolver<'a> {
                     from = rest;
                     forcing.drop = (self.linear_drop() / forcing.drop).min(1.0);
                 }
-                _ => break (found, recovered),
+                rest => break (found, recovered, rest),
             }
         };
         let mut recovered = recovered;
@@ -234,7 +238,19 @@ impl<'a> StepSolver<'a> {
         let Recovered { du, local_residual, refined } = recovered;
         let DualSolution { lambda, outcome, at_floor, .. } = found;
         let applications = self.operator.applications() - before + refined;
-        Ok(Step { du, lambda, outcome, statistics, at_floor, is_exact, local_residual, applications, factorisations })
+        let directions = rest.map(Rest::into_directions).unwrap_or_default();
+        Ok(Step {
+            du,
+            lambda,
+            outcome,
+            statistics,
+            at_floor,
+            is_exact,
+            local_residual,
+            applications,
+            factorisations,
+            directions,
+        })
     }
 
     /// Assembles the tangents at `u` and factorises those that changed by more than `left`; the preconditioner follows. Returns
@@ -247,7 +263,7 @@ impl<'a> StepSolver<'a> {
         timer: &Timer,
     ) -> Result<usize, NotDefinite> {
         let Self { operator, preconditioner, flows, .. } = self;
-        let at = Linearisation { regions: &problem.regions(), u, yielding: &state.yielding, flows };
+        let at = Linearisation { regions: &problem.firm_regions(), u, yielding: &state.yielding, flows };
         let interiors = preconditioner.as_mut().map(Preconditioner::interiors);
         let changes = operator.update(&at, left, interiors, problem.space, timer)?;
         if let Some(preconditioner) = preconditioner {
@@ -259,7 +275,7 @@ impl<'a> StepSolver<'a> {
 
     /// `du` from the forces `f_k` and the multipliers that were `found`, to which it adds what the program does not see; `open` is
     /// `c_k`. The subdomains' problems are solved to `wanted`, relative. Collective.
-    fn recover(
+    pub(super) fn recover(
         &mut self,
         problem: &TornProblem,
         (forces, open): (&Torn, &[f64]),
@@ -295,7 +311,7 @@ impl<'a> StepSolver<'a> {
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.
-    fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64], timer: &Timer) {
+    pub(super) fn respond(&mut self, x: &[f64], torn: &mut Torn, y: &mut [f64], timer: &Timer) {
         timer.time("dual operator", || self.operator.respond(x, torn, y));
     }
 }
@@ -315,10 +331,10 @@ fn stays_elastic(problem: &TornProblem, (u, state): (&Torn, &State), du: &Torn) 
 }
 
 /// A displacement from multipliers.
-struct Recovered {
-    du: Torn,
+pub(super) struct Recovered {
+    pub du: Torn,
     /// See [`Step::local_residual`].
-    local_residual: f64,
+    pub local_residual: f64,
     /// Applications of `K^+` in refinement.
-    refined: usize,
+    pub refined: usize,
 }

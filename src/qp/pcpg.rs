@@ -187,6 +187,18 @@ impl<'a> Pcpg<'a> {
 }
 
 impl Directions {
+    /// Takes `x` to the minimum along all of them, where the residual is `b - A x`; no product is needed.
+    pub fn descend(&self, space: &dyn Space, x: &mut [f64], residual: &mut [f64]) {
+        if self.kept.is_empty() {
+            return;
+        }
+        let pairs: Vec<(&[f64], &[f64])> = self.kept.iter().map(|d| (&d.p[..], &*residual)).collect();
+        for (d, slope) in self.kept.iter().zip(space.dots(&pairs)) {
+            axpy(slope / d.curvature, &d.p, x);
+            axpy(-slope / d.curvature, &d.ap, residual);
+        }
+    }
+
     fn keep(&mut self, direction: Direction) {
         if self.kept.len() < KEPT {
             self.kept.push(direction);
@@ -242,6 +254,25 @@ mod tests {
         let limits = Limits { reference: Some(first.first_norm), relative: 1e-9, ..LIMITS };
         let again = Pcpg::new(&Plain).solve(&mut Joined(&mut a, &mut null, None), &mut x, &mut residual, &limits);
         assert_eq!((again.outcome, again.statistics.hessian), (Outcome::Converged, 0));
+    }
+
+    #[test]
+    fn directions_lead_to_other_solutions_without_products() {
+        let mut random = Random::new(9);
+        let n = 30;
+        let mut a = Matrix::with_condition(n, 1e3, &mut random);
+        let mut null = Null::of(vec![random.vector(n)]);
+        let (b, other) = (random.vector(n), random.vector(n));
+        let mut solver = Pcpg::new(&Plain);
+        let (mut x, mut residual) = (vec![0.0; n], b);
+        solver.solve(&mut Joined(&mut a, &mut null, None), &mut x, &mut residual, &LIMITS);
+        let known = solver.into_directions();
+        let (mut x, mut residual) = (vec![0.0; n], other.clone());
+        known.descend(&Plain, &mut x, &mut residual);
+        let ax = a.times(&x);
+        assert!(distance(&residual, &other.iter().zip(&ax).map(|(b, ax)| b - ax).collect::<Vec<_>>()) < 1e-9);
+        // All directions of a space of dimension n - 1 are known.
+        assert!(distance(&x, &enumerate(&a, &other, &vec![f64::NEG_INFINITY; n], &null)) < 1e-6);
     }
 
     #[test]

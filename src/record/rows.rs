@@ -19,9 +19,37 @@ pub struct StepRow {
     pub halvings: u64,
     /// Whether the increment was reached.
     pub converged: bool,
+    /// What it tells of the limit load, where that is sought.
+    #[serde(default)]
+    pub limit_load: Option<LimitLoad>,
     /// The state there.
     #[serde(flatten)]
     pub state: State,
+}
+
+/// Bounds of the limit load factor of a mesh: what multiplies the loads that grow.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LimitLoad {
+    /// From an equilibrium: bodies bear so much.
+    pub lower: f64,
+    /// From a mechanism: they do not bear more.
+    pub upper: f64,
+    /// The factor at the last equilibrium: the best estimate, as it comes near the limit before mechanisms do.
+    pub factor: f64,
+    /// What loads of factor one do on the displacement there (energy).
+    pub work: f64,
+}
+
+impl LimitLoad {
+    /// How far the bounds are apart, relative.
+    pub fn width(self) -> f64 {
+        (self.upper - self.lower) / self.upper.abs()
+    }
+
+    /// With the higher lower bound of both, and the upper one of the later.
+    pub fn then(self, later: Self) -> Self {
+        Self { lower: self.lower.max(later.lower), ..later }
+    }
 }
 
 /// One Newton step.
@@ -76,6 +104,9 @@ pub struct RefinementRow {
     pub gap: f64,
     /// Estimated error of the stress, relative.
     pub stress: f64,
+    /// The limit load, where that is sought; the energy is then `J(u)` without the work of the loads that grow.
+    #[serde(default)]
+    pub limit_load: Option<LimitLoad>,
     /// Newton steps.
     pub newton_iterations: Option<u64>,
     /// Every application of F.

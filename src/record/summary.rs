@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::counts::{CommunicationRow, ContactRow, Counted, Counters, Sizes, Work};
 use super::forecast::{Forecast, HeldRow};
-use super::rows::{CascadeRow, NewtonRow, RefinementRow, StepRow};
+use super::rows::{CascadeRow, LimitLoad, NewtonRow, RefinementRow, StepRow};
 use super::state::State;
 
 /// What a run was about and what came out. Lengths, forces and energies are in the scene's units.
@@ -43,6 +43,8 @@ pub struct Summary {
     /// be an unloading.
     #[serde(flatten)]
     pub state: State,
+    /// Bounds of the limit load factor, where that is sought.
+    pub limit_load: Option<LimitLoad>,
     /// Wall time of the run in seconds.
     pub time_total: Option<f64>,
     /// Seconds outside messages, of the rank with most over that with least.

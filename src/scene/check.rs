@@ -31,6 +31,7 @@ pub(super) fn scene(scene: &Scene) -> Checked {
     scene.contact.iter().try_for_each(|(name, it)| contact(scene, &format!("contact.{name}"), it))?;
     scene.initial.iter().try_for_each(|it| initial(scene, it))?;
     scene.step.iter().enumerate().try_for_each(|(index, it)| step(scene, &format!("step.{index}"), it))?;
+    scene.limit.iter().try_for_each(|it| it.check(scene))?;
     decomposition(scene)?;
     solver(&scene.solver)?;
     scene.steps().iter().try_for_each(|step| compatible_supports(scene, step))?;

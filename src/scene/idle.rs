@@ -63,13 +63,10 @@ fn supports(scene: &Scene) -> Vec<String> {
 /// What steps scale, by its key, with its factor in each of them; and whether it is zero anyway.
 fn scaled(scene: &Scene) -> impl Iterator<Item = (String, Vec<f64>, bool)> {
     let factors = |of: &dyn Fn(&Step) -> f64| -> Vec<f64> { scene.steps().iter().map(of).collect() };
-    let loads = scene.load.iter().map(move |(name, load)| {
-        let zero = match load {
-            Load::Traction { traction: v, .. } | Load::BodyForce { body_force: v, .. } => *v == [0.0; 3],
-            Load::Pressure { pressure, .. } => *pressure == 0.0,
-        };
-        (format!("load.{name}"), factors(&|step| step.of_load(name)), zero)
-    });
+    let of_load = move |(name, load): (&String, &Load)| {
+        (format!("load.{name}"), factors(&|step| step.of_load(name)), load.is_zero())
+    };
+    let loads = scene.load.iter().map(of_load);
     let supports = scene.support.iter().filter(|(_, support)| moves(support.displacement));
     let supports = supports
         .map(move |(name, _)| (format!("support.{name}.displacement"), factors(&|step| step.of_support(name)), false));

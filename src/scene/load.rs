@@ -40,6 +40,14 @@ impl Load {
         }
     }
 
+    /// Whether nothing acts.
+    pub(super) fn is_zero(&self) -> bool {
+        match self {
+            Self::Traction { traction: v, .. } | Self::BodyForce { body_force: v, .. } => *v == [0.0; 3],
+            Self::Pressure { pressure, .. } => *pressure == 0.0,
+        }
+    }
+
     /// The same, to be settled.
     pub(super) fn surface_mut(&mut self) -> Option<&mut SurfaceName> {
         match self {

@@ -17,6 +17,7 @@ mod held;
 mod idle;
 mod initial;
 pub mod library;
+mod limit;
 mod load;
 mod mapped;
 mod overrides;
@@ -41,6 +42,7 @@ pub use decomposition::{Decomposition, Groups, Method, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use held::Held;
 pub use initial::Initial;
+pub use limit::Limit;
 pub use load::Load;
 pub use mapped::{Cylinder, Grid, Sphere};
 pub use overrides::{concerns, recut, well_formed};
@@ -75,6 +77,9 @@ pub struct Scene {
     /// The load history as given; see [`Scene::steps`].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub step: Vec<Step>,
+    /// The limit load to be found, instead of a history.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<Limit>,
     /// How bodies are cut into subdomains.
     pub decomposition: Decomposition,
     /// Methods, tolerances and limits.

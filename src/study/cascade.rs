@@ -34,7 +34,7 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
     let (from, to) = ((&coarse.bodies[..], &coarse.contacts.pairs), (&fine.bodies[..], &fine.contacts.pairs));
     let closed = closed_contacts(comm, from, &solved.closed, to);
     let kept = |kind| if let Kind::Contact { pair } = kind { closed.contains(&pair) } else { true };
-    newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect() }
+    newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect(), reach: None }
 }
 
 /// Which boxes of each body of a finer mesh (x fastest) are likely to yield: those around the coarse elements that yield. `None` if

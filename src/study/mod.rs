@@ -8,6 +8,7 @@ pub mod adaptive;
 pub mod cascade;
 pub mod contact;
 mod fields;
+mod limit;
 mod limits;
 mod recorder;
 mod report;
@@ -30,7 +31,9 @@ use crate::material::History;
 use crate::model::{self, Discrete, ModelError};
 use crate::monitor::events::Event;
 use crate::monitor::timing::Timer;
+use crate::newton::control::Reach;
 use crate::newton::{self, Newton, Next, Outcome, TornProblem};
+use crate::record::rows::LimitLoad;
 use crate::record::summary::Summary;
 use crate::restart::state::Earlier;
 use crate::restart::{self, Standing};
@@ -59,8 +62,8 @@ pub enum Begin {
     Rest,
     /// Near its solution, which has no history.
     Near(newton::Start),
-    /// Near a solution without history of which a displacement is known.
-    Around(Torn),
+    /// Near a solution without history of which a displacement is known, and where the limit load is on another mesh.
+    Around(Torn, Option<LimitLoad>),
     /// From the state that an earlier run left, without its loads.
     After(Earlier),
     /// Where another one stood.
@@ -120,11 +123,15 @@ pub fn solve(
     let mut recorder = Recorder::new(scene, discrete, comm);
     let begin = enter(begin, &mut problem, &mut recorder);
     let settings = solver::settings(scene);
-    let mut newton = Newton::new(problem, solver, settings, stages, begin, timer);
+    let growing = model::history::growing(scene, discrete, &|| connection.gather.zeros());
+    let mut newton = Newton::new(problem, solver, settings, (stages, growing), begin, timer);
 
-    let failure = follow(scene, &mut newton, &mut recorder, timer, watcher)?;
-
-    let summary = summarise(scene, discrete, newton.steps(), &failure, std::mem::take(&mut recorder.rows), comm);
+    let (failure, limit_load) = match &scene.limit {
+        None => (follow(scene, &mut newton, &mut recorder, timer, watcher)?, None),
+        Some(limit) => limit::seek(limit, &mut newton, &mut recorder, timer, watcher)?,
+    };
+    let rows = std::mem::take(&mut recorder.rows);
+    let summary = Summary { limit_load, ..summarise(scene, discrete, newton.steps(), &failure, rows, comm) };
     let (problem, u) = newton.finish();
     let meshes = restart::meshes::meshes(comm, scene, discrete);
     let mesh_names = serde_json::to_string(&meshes).expect("names and numbers can be written");
@@ -146,17 +153,23 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
             problem.make_admissible(&mut start.u);
             newton::Begin::Near(start)
         }
-        Begin::Around(mut u) => {
+        Begin::Around(mut u, limit) => {
             problem.make_admissible(&mut u);
             let largest = problem.space.maximum(newton::residuals::largest_displacement(&u));
             let kept = problem.constraints.laws().kept_at(&problem.slack(&u), ROUNDING * largest);
-            newton::Begin::Near(newton::Start { u, kept })
+            // Flowing bodies hardly resist what interpolation leaves open, and contacts part: those are found again from rest.
+            if limit.is_some() && problem.constraints.has_inequalities {
+                u = problem.gather.zeros();
+                problem.make_admissible(&mut u);
+            }
+            let reach = limit.map(|limit| Reach { work: Some(limit.work), factor: limit.factor, number: 1 });
+            newton::Begin::Near(newton::Start { u, kept, reach })
         }
         Begin::After(Earlier { committed, u }) => {
             let closed = ROUNDING * committed.sizes.displacement;
             let kept = problem.constraints.laws().kept_at(&problem.slack(&u), closed);
             problem.committed = committed;
-            newton::Begin::Near(newton::Start { u, kept })
+            newton::Begin::Near(newton::Start { u, kept, reach: None })
         }
         Begin::At(standing) => {
             let Standing { newton, rows, recorded } = *standing;
@@ -166,6 +179,9 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
     }
 }
 
+/// Where and how a history was given up.
+type Failure = (newton::path::At, Outcome);
+
 /// Steps Newton from increment to increment until the history is over; returns where and how it was given up.
 fn follow(
     scene: &Scene,
@@ -173,41 +189,20 @@ fn follow(
     recorder: &mut Recorder,
     timer: &Timer,
     watcher: &mut dyn Watcher,
-) -> Result<Option<(newton::path::At, Outcome)>, StudyError> {
-    let watcher = RefCell::new(watcher);
-    let tell = |event: Event| watcher.borrow_mut().tell(event);
-    let alive = |step: usize, applications: usize| {
-        tell(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });
-    };
+) -> Result<Option<Failure>, StudyError> {
     loop {
         let at = newton.at();
-        place(scene, at).into_iter().for_each(|place| tell(Event::Increment(place)));
-        while newton.outcome().is_none() {
-            let standing = || {
-                let (rows, recorded) = recorder.standing();
-                Standing { newton: newton.snapshot(), rows, recorded }
-            };
-            if watcher.borrow_mut().stops(&standing) {
-                return Err(StudyError::Stopped);
-            }
-            if let Some(record) = newton.step(timer, &alive) {
-                tell(Event::NewtonStep(newton_row(at.number, record)));
-                loss_of_accuracy(record).into_iter().for_each(|text| tell(Event::Warning(text)));
-            }
-        }
-        let outcome = newton.outcome().cloned();
-        if outcome == Some(Outcome::Converged) {
-            recorder.record(newton, timer);
-        }
+        place(scene, at).into_iter().for_each(|place| watcher.tell(Event::Increment(place)));
+        let outcome = iterate(newton, recorder, timer, watcher)?;
         match newton.advance(timer) {
             Next::Increment => {}
             Next::Half(at, outcome) => {
                 let place = place(scene, at).unwrap_or_else(|| "the whole load".into());
                 let reason = outcome.message().unwrap_or_default();
-                tell(Event::Warning(format!("{place}: {reason}; the increment is halved")));
+                watcher.tell(Event::Warning(format!("{place}: {reason}; the increment is halved")));
             }
             Next::End => {
-                let failure = outcome.filter(|outcome| *outcome != Outcome::Converged);
+                let failure = Some(outcome).filter(|outcome| *outcome != Outcome::Converged);
                 if failure.is_some() && newton.reached().is_none() {
                     // Nothing ever converged: what there is is better than nothing.
                     recorder.record(newton, timer);
@@ -216,4 +211,39 @@ fn follow(
             }
         }
     }
+}
+
+/// Steps Newton until it is known how the present attempt ends, and records what it reached.
+fn iterate(
+    newton: &mut Newton,
+    recorder: &mut Recorder,
+    timer: &Timer,
+    watcher: &mut dyn Watcher,
+) -> Result<Outcome, StudyError> {
+    let number = newton.at().number;
+    let watcher = RefCell::new(watcher);
+    let tell = |event: Event| watcher.borrow_mut().tell(event);
+    let alive = |step: usize, applications: usize| {
+        tell(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });
+    };
+    let outcome = loop {
+        if let Some(outcome) = newton.outcome() {
+            break outcome.clone();
+        }
+        let standing = || {
+            let (rows, recorded) = recorder.standing();
+            Standing { newton: newton.snapshot(), rows, recorded }
+        };
+        if watcher.borrow_mut().stops(&standing) {
+            return Err(StudyError::Stopped);
+        }
+        if let Some(record) = newton.step(timer, &alive) {
+            tell(Event::NewtonStep(newton_row(number, record)));
+            loss_of_accuracy(record).into_iter().for_each(|text| tell(Event::Warning(text)));
+        }
+    };
+    if outcome == Outcome::Converged {
+        recorder.record(newton, timer);
+    }
+    Ok(outcome)
 }

@@ -13,7 +13,7 @@ use crate::newton::balance::BodyBalance;
 use crate::newton::path::At;
 use crate::newton::{self, Iterate, Newton, StepRecord, TornProblem};
 use crate::record::counts::{ContactRow, Counters};
-use crate::record::rows::{NewtonRow, StepRow};
+use crate::record::rows::{LimitLoad, NewtonRow, StepRow};
 use crate::record::state::{Acting, Errors, Measures, Residuals, State};
 use crate::record::summary::Summary;
 use crate::scene::{self, Scene};
@@ -43,7 +43,8 @@ pub(super) fn step_row(
     contact: &[ContactState],
     von_mises: f64,
 ) -> StepRow {
-    let at = newton.at();
+    let (at, converged) = (newton.at(), newton.outcome() == Some(&newton::Outcome::Converged));
+    let bounds = if converged { newton.bounds() } else { None };
     let measures = limits::measure(comm, scene, discrete, newton, contact);
     StepRow {
         step: at.stage as u64 + 1,
@@ -51,7 +52,8 @@ pub(super) fn step_row(
         increment: at.increment as u64,
         time: at.time(),
         halvings: at.halvings as u64,
-        converged: newton.outcome() == Some(&newton::Outcome::Converged),
+        converged,
+        limit_load: bounds.map(|newton::Bounds { lower, upper, work }| LimitLoad { lower, upper, factor: lower, work }),
         state: State { measures, ..state(scene, discrete, newton, contact, von_mises) },
     }
 }
@@ -131,6 +133,12 @@ pub(super) fn summarise(
     let total = |count: fn(&StepRecord) -> usize| Some(steps.iter().map(|(_, s)| count(s)).sum::<usize>() as u64);
     let message = |(at, outcome): &(At, newton::Outcome)| {
         let mut message = outcome.message()?;
+        if scene.limit.is_some() {
+            let found = rows.iter().rev().find_map(|row| row.limit_load);
+            let found =
+                found.map(|LimitLoad { lower, upper, .. }| format!("; the last bounds are {lower:.6} and {upper:.6}"));
+            return Some(message + &found.unwrap_or_default());
+        }
         if scene.has_limit_load() && !scene.load.is_empty() {
             message = collapse(scene, &rows, *at, &message);
         }

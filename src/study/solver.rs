@@ -70,10 +70,12 @@ fn programs(scene: &Scene) -> ProgramSettings {
 /// When Newton's method stops.
 pub(super) fn settings(scene: &Scene) -> Settings {
     let solver = &scene.solver;
+    // An equilibrium is a lower bound of a limit load if it is one.
+    let of_limit = scene.limit.as_ref().map_or(0.0, |limit| limit.tolerance);
     Settings {
-        tolerance: solver.newton_tolerance,
-        residual: solver.residual_tolerance,
+        tolerance: solver.newton_tolerance.max(0.1 * of_limit),
+        residual: solver.residual_tolerance.max(0.01 * of_limit),
         limit: solver.newton_limit,
-        accuracy: solver.accuracy,
+        accuracy: solver.accuracy.filter(|_| scene.limit.is_none()),
     }
 }

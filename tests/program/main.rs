@@ -18,6 +18,7 @@ mod held;
 mod history;
 mod initial;
 mod library;
+mod limit;
 mod limits;
 mod loads;
 mod many;

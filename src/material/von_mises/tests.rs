@@ -303,3 +303,30 @@ fn for_small_changes_the_divergence_is_half_the_tangent() {
     }
     assert!(tested > 50);
 }
+
+#[test]
+fn a_firmer_law_has_the_tangents_that_are_asked_for_and_the_same_strength() {
+    for least in [1e-6, 1e-4, 0.5] {
+        let soft = VonMises { hardening: 0.0, kinematic_hardening: 0.0, ..STEEL };
+        let firm = soft.firmer(least);
+        assert!((firm.least_tangent() / least - 1.0).abs() < 1e-12 && firm.yield_stress == soft.yield_stress);
+        assert_eq!(firm.firmer(0.5 * least), firm);
+        let elastic = VonMises { yield_stress: None, ..STEEL };
+        assert_eq!(elastic.firmer(least), elastic);
+    }
+}
+
+#[test]
+fn no_stress_without_pressure_has_more_power_than_the_dissipation_and_that_of_flow_has_it() {
+    let perfect = VonMises { hardening: 0.0, kinematic_hardening: 0.0, ..STEEL };
+    let mut random = Random::new(11);
+    for _ in 0..100 {
+        let rate: Voigt = random.vector(1.0);
+        let most = perfect.dissipation(&rate).expect("it has a limit");
+        let power = |strain: &Voigt| contract(&deviator(&perfect.respond(strain, &PlasticState::VIRGIN).stress), &rate);
+        assert!(power(&random.vector(0.1)) <= most * (1.0 + 1e-12));
+        assert!((power(&rate) / most - 1.0).abs() < 1e-12);
+    }
+    let none = [VonMises { yield_stress: None, ..perfect }, VonMises { hardening: 1.0, ..perfect }];
+    assert!(none.iter().all(|law| law.dissipation(&[1.0; 6]).is_none()));
+}

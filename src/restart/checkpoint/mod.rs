@@ -27,6 +27,7 @@ use crate::feti::inverse::basis::Bases;
 use crate::material::History;
 use crate::model::discrete::Discrete;
 use crate::newton::committed::{Committed, Sizes};
+use crate::newton::control::Reach;
 use crate::newton::forcing::Forcing;
 use crate::newton::path::Attempt;
 use crate::newton::program::ProgramState;
@@ -60,6 +61,7 @@ struct Numbers {
     norm: Option<f64>,
     has_kept: bool,
     is_double: bool,
+    reach: Option<Reach>,
     rows: Vec<StepRow>,
     times: Vec<f64>,
 }
@@ -128,6 +130,7 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         norm: newton.solver.programs.norm,
         has_kept: newton.solver.programs.kept.is_some(),
         is_double: newton.solver.precision == Precision::Double,
+        reach: newton.reach,
         rows,
         times: recorded.times,
     };
@@ -214,6 +217,7 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
         kept,
         forcing: numbers.forcing,
         solver: SolverState { programs, flows: arrays.flows, precision, bases: arrays.bases },
+        reach: numbers.reach,
     };
     let Arrays { point_data, cell_data, .. } = arrays;
     let recorded = Piece { times: numbers.times, point_data, cell_data, ..Piece::default() };

@@ -42,21 +42,27 @@ pub fn estimate(of: ErrorOf, meshes: &[RefinementRow]) -> f64 {
     }
 }
 
-/// Whether a mesh took more than one increment: energies are of steps from different states then.
+/// Whether a mesh took more than one increment of a history: energies are of steps from different states then.
 pub fn is_history(meshes: &[RefinementRow]) -> bool {
-    meshes.iter().any(|row| row.increments > 1)
+    meshes.iter().any(|row| row.increments > 1 && row.limit_load.is_none())
 }
 
 /// How far the last mesh raised the energy: shapes or conditions changed, and the error is as large at least.
 fn rise(meshes: &[RefinementRow]) -> f64 {
     let [.., before, last] = meshes else { return 0.0 };
-    last.energy - before.energy
+    if compares(before, last) { last.energy - before.energy } else { 0.0 }
+}
+
+/// Whether two energies are those of the same problem: loads that grow to their limit may have done other work.
+fn compares(coarse: &RefinementRow, fine: &RefinementRow) -> bool {
+    let work = |row: &RefinementRow| row.limit_load.map(|limit| limit.work);
+    work(coarse) == work(fine)
 }
 
 /// `theta`.
 fn factor(meshes: &[RefinementRow]) -> f64 {
     let Some((fine, coarser)) = meshes.split_last() else { return UNKNOWN };
-    let tells = |coarse: &&RefinementRow| coarse.distance >= APART * fine.distance;
+    let tells = |coarse: &&RefinementRow| coarse.distance >= APART * fine.distance && compares(coarse, fine);
     let theta = |coarse: &RefinementRow| (coarse.energy - fine.energy) / (coarse.distance - fine.distance);
     let told = coarser.iter().rev().filter(tells).take(2).map(theta);
     told.reduce(f64::max).unwrap_or(UNKNOWN).max(LEAST)
@@ -65,9 +71,20 @@ fn factor(meshes: &[RefinementRow]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::rows::LimitLoad;
 
     fn known(energy: f64, distance: f64) -> RefinementRow {
         RefinementRow { energy, size: energy.abs(), distance, stress: 0.1, increments: 1, ..RefinementRow::default() }
+    }
+
+    #[test]
+    fn energies_of_other_works_are_not_compared() {
+        let limit = |work: f64| Some(LimitLoad { lower: 1.0, upper: 1.0, factor: 1.0, work });
+        let row = |energy, distance, work| RefinementRow { limit_load: limit(work), ..known(energy, distance) };
+        let [coarse, other, fine] = [row(9.0, 4.0, 1.0), row(100.0, 8.0, 2.0), row(8.0, 1.0, 1.0)];
+        let alone = estimate(ErrorOf::Energy, &[coarse.clone(), fine.clone()]);
+        assert_eq!(estimate(ErrorOf::Energy, &[other.clone(), coarse, fine.clone()]), alone);
+        assert_eq!(estimate(ErrorOf::Energy, &[other, fine]), UNKNOWN * 1.0 / 8.0);
     }
 
     #[test]

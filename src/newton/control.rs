@@ -1,0 +1,166 @@
+//! Loads that follow the work they do: indirect control by compliance.
+//!
+//! ```text
+//! f = f_0 + zeta f_1   with   f_1'u = alpha
+//! ```
+//!
+//! Bodies without hardening bear `f_1` up to a limit factor. Up to there displacements follow from `zeta`; beyond it nothing does. For
+//! the work `alpha` there is an equilibrium each time, whose `zeta` rises with it to the limit (Cermak, Haslinger, Kozubek and
+//! Sysala, ZAMM 95 (2015), 1348-1371). A Newton step has two parts: the step `du` under the present loads, and the response `v` of
+//! its tangents to `f_1`:
+//!
+//! ```text
+//! d zeta = (alpha - f_1'(u + du)) / f_1'v,   du + d zeta v
+//! ```
+//!
+//! The second part takes the contacts as the first left them; the next step corrects them.
+
+use std::mem::take;
+
+use serde::{Deserialize, Serialize};
+
+use super::outcome::Outcome;
+use super::path::At;
+use super::problem::{State, TornProblem};
+use super::response::Response;
+use super::step::{Step, StepSolver};
+use crate::assembly::dissipation;
+use crate::feti::Torn;
+use crate::material::{Law, Material};
+use crate::monitor::timing::Timer;
+use crate::qp;
+use crate::vector::dot;
+
+/// The first work is that of [`strength`], on an elastic body, times this.
+const FIRST: f64 = 6.0;
+/// What tangents are of the elastic stiffness at least: a mechanism is not free then, and what holds it tells how far it goes.
+const LEAST: f64 = 1e-4;
+
+/// Where the loads are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reach {
+    /// `alpha` (energy); `None` until the first step has told a good one.
+    pub work: Option<f64>,
+    /// `zeta`.
+    pub factor: f64,
+    /// How often `alpha` was chosen.
+    pub number: usize,
+}
+
+/// The loads, and where they are.
+#[derive(Clone)]
+pub struct Control {
+    /// `f_0`, torn (force).
+    permanent: Torn,
+    /// `f_1`, torn (force).
+    along: Torn,
+    /// Where they are.
+    pub reach: Reach,
+}
+
+impl Control {
+    /// From the loads `f_0 + f_1` that are at hand: `zeta` is 1, or what it was `before`.
+    pub fn new(loads: &Torn, along: Torn, before: Option<Reach>) -> Self {
+        let mut permanent = loads.clone();
+        add(-1.0, &along, &mut permanent);
+        Self { permanent, along, reach: before.unwrap_or(Reach { work: None, factor: 1.0, number: 1 }) }
+    }
+
+    /// `f_0 + zeta f_1`.
+    pub fn loads(&self) -> Torn {
+        let mut loads = self.permanent.clone();
+        add(self.reach.factor, &self.along, &mut loads);
+        loads
+    }
+
+    /// Where it stands, in the words of a path: equilibria are its increments, and times their numbers.
+    pub fn at(&self) -> At {
+        let number = self.reach.number;
+        At { stage: 0, increment: number, number, fraction: number as f64, halvings: 0 }
+    }
+
+    /// `f_1'u` of each displacement. One collective.
+    pub fn works<const N: usize>(&self, problem: &TornProblem, displacements: [&Torn; N]) -> Vec<f64> {
+        let of = |own: usize| displacements.map(|u| dot(&self.along[own], &u[own]));
+        problem.space.sum((0..self.along.len()).map(of).collect::<Vec<_>>().as_flattened(), N)
+    }
+
+    /// `f_0'v`. One collective.
+    pub fn permanent_work(&self, problem: &TornProblem, v: &Torn) -> f64 {
+        let of = |own: usize| dot(&self.permanent[own], &v[own]);
+        problem.space.sum(&(0..v.len()).map(of).collect::<Vec<_>>(), 1)[0]
+    }
+
+    /// Changes `zeta`, with the loads of the problem and the energies at a displacement that does the work `before`.
+    fn change(&mut self, problem: &mut TornProblem, change: f64, before: f64, state: &mut State) {
+        self.reach.factor += change;
+        problem.loads = self.loads();
+        state.external_work += change * before;
+        state.energy -= change * before;
+    }
+
+    /// Completes a step at `u` under the present loads, whose gradient was reduced by `drop`. Collective.
+    ///
+    /// # Errors
+    /// The outcome of the iteration, if there is no response to go along.
+    pub fn steer(
+        &mut self,
+        problem: &mut TornProblem,
+        solver: &mut StepSolver,
+        (u, state): (&Torn, &mut State),
+        (step, drop): (&mut Step, f64),
+        timer: &Timer,
+    ) -> Result<(), Outcome> {
+        let directions = take(&mut step.directions);
+        let Response { v, lambda, outcome, statistics, applications } =
+            solver.response(problem, &self.along, drop, directions, timer);
+        step.statistics += statistics;
+        step.applications += applications;
+        match outcome {
+            qp::Outcome::Converged | qp::Outcome::LimitReached => {}
+            qp::Outcome::NotFinite => return Err(Outcome::NotFinite),
+            outcome => return Err(Outcome::Inner(outcome)),
+        }
+        let [compliance, before, added] = self.works(problem, [&v, u, &step.du])[..] else { unreachable!() };
+        let work = match self.reach.work {
+            Some(work) => work,
+            // Where the body is without `f_1`, and from there.
+            None => before + added + (FIRST * strength(problem, &v) - self.reach.factor) * compliance,
+        };
+        self.reach.work = Some(work);
+        if !(compliance > 0.0 && work.is_finite()) {
+            return Err(Outcome::Idle);
+        }
+        let change = (work - before - added) / compliance;
+        add(change, &v, &mut step.du);
+        step.lambda.iter_mut().zip(&lambda).for_each(|(l, of_v)| *l += change * of_v);
+        problem.constraints.laws().project(&mut step.lambda);
+        self.change(problem, change, before, state);
+        step.is_exact = false;
+        Ok(())
+    }
+}
+
+/// The most power that a mechanism takes, see [`dissipation::most`], with the stress at `u`. One collective.
+pub fn most(problem: &TornProblem, u: &Torn, v: &Torn) -> f64 {
+    let of = |own: usize| dissipation::most(&problem.region(own), &u[own], &v[own]);
+    problem.space.sum(&(0..u.len()).map(of).collect::<Vec<_>>(), 1)[0]
+}
+
+/// A factor of loads with the elastic response `v`: where stresses are their limit on average, those that do more work count more. Not
+/// a number where no stress is limited. One collective.
+fn strength(problem: &TornProblem, v: &Torn) -> f64 {
+    let of = |own: usize| dissipation::use_of_strength(&problem.region(own), &v[own]);
+    let sums = problem.space.sum((0..v.len()).map(of).collect::<Vec<_>>().as_flattened(), 2);
+    sums[0] / sums[1]
+}
+
+/// Materials as tangents take them near a limit.
+pub(super) fn firm(materials: &[Material]) -> Vec<Material> {
+    materials.iter().map(|material| material.firmer(LEAST)).collect()
+}
+
+/// `y += a x`.
+pub(super) fn add(a: f64, x: &Torn, y: &mut Torn) {
+    y.iter_mut().zip(x).for_each(|(y, x)| y.iter_mut().zip(x).for_each(|(y, x)| *y += a * x));
+}

@@ -1,0 +1,166 @@
+//! Limit loads against closed forms: on any ranks, beside loads that stay, with contact, where there is none, and refined.
+
+use crate::checkpoint::{assert_same_result, resume_with, stopped_after};
+use crate::common::{assert_scene_refused, number, run_briefly, scene_file, solve, solve_with};
+use serde_json::Value;
+
+const SPHERE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/limit/sphere.toml");
+const CYLINDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/limit/cylinder.toml");
+const STRIP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/limit/strip.toml");
+
+/// Lower bound, upper bound and the factor of the last equilibrium; the lower one is below the upper one, as near as was wanted.
+fn bounds(summary: &Value, tolerance: f64) -> [f64; 3] {
+    let limit = &summary["limit_load"];
+    let [lower, upper, factor] = ["lower", "upper", "factor"].map(|key| number(limit, key));
+    assert!(lower <= upper * (1.0 + 1e-3 * tolerance) && upper - lower <= tolerance * upper.abs(), "{limit}");
+    [lower, upper, factor]
+}
+
+/// Both bounds are within a hundredth of the closed form, in a tenth of the multiplications that approaching it took.
+#[test]
+fn closed_forms_are_between_bounds_or_near_them() {
+    for (scene, multiplications) in [(SPHERE, 300.0), (CYLINDER, 100.0), (STRIP, 256.0)] {
+        let summary = solve(2, scene, &[]).converged().summary();
+        let [lower, upper, _] = bounds(&summary, 0.01);
+        assert!((lower - 1.0).abs() < 0.0102 && (upper - 1.0).abs() < 0.0102, "{scene}: {lower} to {upper}");
+        assert!(number(&summary, "hessian_multiplications") <= multiplications, "{scene}");
+    }
+}
+
+#[test]
+fn bounds_are_the_same_bits_on_any_ranks() {
+    let sets = ["decomposition.subdomains=6"];
+    let alone = solve(1, STRIP, &sets).converged();
+    for ranks in [2, 3] {
+        let run = solve(ranks, STRIP, &sets).converged();
+        for key in ["limit_load", "energy", "hessian_multiplications", "steps"] {
+            assert_eq!(run.summary()[key], alone.summary()[key], "{key} on {ranks} ranks");
+        }
+    }
+}
+
+#[test]
+fn it_goes_on_from_a_checkpoint_between_any_two_steps() {
+    const CELLS: [&str; 2] = ["body.lower.brick.cells=[12, 4, 4]", "body.upper.brick.cells=[12, 4, 4]"];
+    const SOFT: [&str; 2] = ["material.lower.hardening=0", "material.upper.hardening=0"];
+    const REST: [&str; 4] =
+        ["body.lower.element=hex8", "body.upper.element=hex8", "decomposition.subdomains=4", "limit.tolerance=0.05"];
+    let sets = [&CELLS[..], &SOFT, &REST].concat();
+    let directory = tempfile::tempdir().unwrap();
+    let (whole, out) = (directory.path().join("whole"), directory.path().join("stopped"));
+    let end = run_briefly(1, &crate::checkpoint::solve(&whole, &sets, &[]));
+    assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+    for (steps, ranks) in [(1, 2), (9, 3)] {
+        let end = resume_with(ranks, &stopped_after(steps, &out, &sets), &[]);
+        assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+        assert_same_result(&out, &whole, "two-blocks");
+    }
+}
+
+/// What a sphere bears inside grows by what presses outside, in all.
+#[test]
+fn loads_that_stay_shift_the_limit_as_they_must() {
+    let alone = bounds(&solve(1, SPHERE, &["body.wall.sphere.cells=[3, 3]"]).converged().summary(), 0.01)[2];
+    let pressure = 2.0 * 240.0 * 2f64.ln();
+    for share in [-0.5, 0.4, 1.5] {
+        let outside = format!("load.outside={{surface=\"wall.outer\",pressure={:?}}}", share * pressure);
+        let sets = ["body.wall.sphere.cells=[3, 3]", &outside, "limit.loads=[\"bore\"]"];
+        let found = bounds(&solve(1, SPHERE, &sets).converged().summary(), 0.01)[2];
+        assert!((found - alone - share).abs() < 2e-3, "{share}: {found}");
+    }
+}
+
+/// The limit does not depend on elastic moduli, on units, on gaps and overlaps, or on how bodies are cut.
+#[test]
+fn the_limit_is_that_of_strength_alone() {
+    let near = |sets: &[&str], wanted: f64| {
+        let found = bounds(&solve(2, STRIP, sets).converged().summary(), 0.01)[2];
+        assert!((found / wanted - 1.0).abs() < 3e-3, "{sets:?}: {found} for {wanted}");
+    };
+    let alone = bounds(&solve(2, STRIP, &["limit.tolerance=1e-4"]).converged().summary(), 1e-4)[2];
+    near(&["material.ground.poisson=0.3"], alone);
+    near(&["material.ground.poisson=0.499"], alone);
+    near(&["material.ground.young=1e6", "material.stamp.young=1e12"], alone);
+    near(&["load.stamp.pressure=1e-3"], alone * 2519.355 * 1e3);
+    near(&["contact.foot.gap=0.02"], alone);
+    near(&["contact.foot.gap=-0.02"], alone);
+    near(&["decomposition.subdomains=7"], alone);
+    let rested = "load.weight={body=\"ground\",body_force=[0.0,0.0,-30.0]}";
+    near(&[rested, "limit.loads=[\"stamp\"]"], alone);
+}
+
+/// The weaker of two parts decides: a stamp that is squeezed between plane walls bears 2/sqrt(3) of its yield stress.
+#[test]
+fn the_weakest_part_decides() {
+    let sets = ["material.stamp.yield_stress=1000", "material.ground.yield_stress=1e9"];
+    let summary = solve(1, STRIP, &sets).converged().summary();
+    let [lower, upper, _] = bounds(&summary, 0.01);
+    let wanted = 2.0 / 3f64.sqrt() * 1000.0 / 2519.3551;
+    assert!((lower / wanted - 1.0).abs() < 1e-2 && (upper / wanted - 1.0).abs() < 1e-2, "{lower} to {upper}");
+}
+
+/// A soft cantilever on an elastic one of the same size: that bears everything, and no limit is told.
+#[test]
+fn elastic_parts_know_no_limit() {
+    let mut text = String::from(
+        "material.soft = { young = 1e5, poisson = 0.3, yield_stress = 240.0 }\nmaterial.hard = { young = 1e5, poisson = 0.3 }\n\
+         load.top = { surface = \"soft.zmax\", pressure = 1.0 }\nlimit = {}\n\
+         contact.joint = { slave = \"soft.zmin\", master = \"hard.zmax\" }\n",
+    );
+    for (body, z) in [("soft", 1.0), ("hard", 0.0)] {
+        text += &format!(
+            "[body.{body}]\nmaterial = \"{body}\"\nelement = \"hex8\"\n\
+             brick = {{ origin = [0.0, 0.0, {z:?}], size = [6.0, 1.0, 1.0], cells = [6, 1, 1] }}\n\
+             [support.{body}]\nsurface = \"{body}.xmin\"\nfix = [\"x\", \"y\", \"z\"]\n"
+        );
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let run = solve(1, &scene_file(directory.path(), &text), &[]);
+    assert_eq!(run.code, 1);
+    let summary = run.summary();
+    assert!(summary["converged"] == false && summary["error"].as_str().unwrap().contains("the last bounds are"));
+    let limit = &summary["limit_load"];
+    assert!(number(limit, "upper") > 1.5 * number(limit, "lower"), "{limit}");
+}
+
+/// Of a mesh of 18 tetrahedra that is refined, the limit comes near the closed form from above, as it must.
+#[test]
+fn meshes_are_refined_to_a_limit() {
+    for (scene, cells) in [(SPHERE, "body.wall.sphere.cells=[1, 1]"), (CYLINDER, "body.wall.cylinder.cells=[2, 1, 1]")]
+    {
+        let summary = solve_with(2, scene, 1, &[cells], &["--error", "0.5%"]).converged().summary();
+        let rows = summary["refinements"].as_array().unwrap();
+        let factors: Vec<f64> = rows.iter().map(|row| number(&row["limit_load"], "factor")).collect();
+        assert!(rows.len() > 2 && factors.iter().all(|factor| *factor > 0.9999), "{factors:?}");
+        let [lower, upper, factor] = bounds(&summary, 0.01);
+        assert!(factor < 1.005 && lower > 0.999 && upper < 1.012, "{lower} to {upper}");
+    }
+}
+
+#[test]
+fn the_command_line_asks_for_a_limit_too() {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/precision/limit-sphere.toml");
+    let sets = ["step=[]", "body.wall.sphere.cells=[2, 2]"];
+    let run = solve_with(1, scene, 1, &sets, &["--limit=5%"]);
+    let summary = run.converged().summary();
+    bounds(&summary, 0.05);
+    assert!(summary["steps"].as_array().unwrap().iter().all(|row| !row["limit_load"].is_null()));
+}
+
+#[test]
+fn what_has_no_limit_is_refused() {
+    for (sets, key) in [
+        (&["limit.tolerance=0"][..], "limit.tolerance"),
+        (&["limit.tolerance=1"], "limit.tolerance"),
+        (&["limit.loads=[]"], "limit.loads"),
+        (&["limit.loads=[\"bore\",\"bore\"]"], "limit.loads"),
+        (&["limit.loads=[\"weight\"]"], "no such load: known are bore"),
+        (&["load.bore.pressure=0"], "no load that could grow"),
+        (&["material.steel.hardening=100"], "no limit load"),
+        (&["step=[{}]"], "does not depend on a history"),
+        (&["initial.result=\"before.vtkhdf\""], "does not depend on an earlier state"),
+        (&["limit.load=1"], "load"),
+    ] {
+        assert_scene_refused(SPHERE, sets, 65, &[key]);
+    }
+}
