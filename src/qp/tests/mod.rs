@@ -1,4 +1,5 @@
 //! What the tests of the solvers share: small dense problems whose solutions are known.
 
+mod bits;
 pub mod dense;
 pub mod torn;
