@@ -1,9 +1,11 @@
 //! Quadratic programming with bounds and a projector: pure optimisation, no meshes, no FETI.
 //!
 //! The problem is min 1/2 x'A x - x'b over { x >= l, G x = 0 }, known by products with A and with the orthogonal
-//! projector P onto the null space of G ([`quadratic`]). A needs to be positive definite on that null space only.
+//! projector P onto the null space of G ([`quadratic`]). A needs to be positive definite on that null space only. Instead of
+//! bounds, pairs of entries may have discs that they stay in.
 //!
-//! - [`smalse`]: bounds and equalities, convergence guaranteed; its inner loop is [`mprgp`] on [`feasible`];
+//! - [`smalse`]: bounds and equalities, convergence guaranteed; its inner loop is [`mprgp`] on [`feasible`], the
+//!   only one that knows [`discs`];
 //! - [`pcpg`]: equalities only, with all search directions kept;
 //! - [`active_set`]: guesses the active bounds, solves for equalities, corrects the guess: fast, but without a proof;
 //! - [`nnls`]: small dense nonnegative least squares: whether a force can be made of pushes;
@@ -12,6 +14,7 @@
 //! A solver never fails with an error: it ends with an [`Outcome`] and the best it has.
 
 pub mod active_set;
+pub mod discs;
 pub mod feasible;
 pub mod mprgp;
 pub mod nnls;
@@ -53,7 +56,7 @@ pub struct Statistics {
     pub sets: usize,
     /// Conjugate gradient steps.
     pub cg: usize,
-    /// Steps that ran into bounds.
+    /// Steps that ran into bounds or along circles.
     pub expansions: usize,
     /// Steps that left bounds.
     pub proportionings: usize,

@@ -1,4 +1,5 @@
-//! MPRGP: minimisation of 1/2 x'H x - x'b over { x >= l }, modified proportioning with reduced gradient projections.
+//! MPRGP: minimisation of 1/2 x'H x - x'b over { x >= l, |(x_i, x_j) - c| <= r }, modified proportioning with reduced gradient
+//! projections.
 //!
 //! Dostal and Schoberl, Comput. Optim. Appl. 30 (2005); Dostal and Kozubek, Math. Program. 135 (2012). While the chopped
 //! gradient is small against the free one (|beta|^2 <= Gamma^2 phi~'phi) it takes conjugate gradient steps on the free
@@ -7,7 +8,8 @@
 //! z = mask(M mask(g)) with one M for all faces.
 //!
 //! The cost never rises: an expansion that failed to lower it is replaced by one that cannot fail. The gradient is
-//! updated along CG steps and is computed afresh after expansions. Beside x goes its *defect*, the part that violates
+//! updated along CG steps and is computed afresh after expansions. Pairs of entries on the circle of their disc slide along it
+//! by the steps of `slide.rs`; without discs nothing of that is done. Beside x goes its *defect*, the part that violates
 //! equality constraints: SMALSE-M penalises it and stops by it.
 
 use super::feasible::{FeasibleSet, Parts};
@@ -61,11 +63,52 @@ pub struct Norms {
     pub defect: f64,
 }
 
+/// Squares and products of the parts of a gradient.
+#[derive(Clone, Copy)]
+struct Squares {
+    /// phi'phi.
+    free: f64,
+    /// beta'beta.
+    chopped: f64,
+    /// phi~'phi.
+    reduced: f64,
+    /// Of the defect.
+    defect: f64,
+    /// phi'H p with the last H p.
+    free_hp: f64,
+    /// Of the part of phi that pairs can slide by.
+    tangent: f64,
+}
+
+impl Squares {
+    fn is_finite(&self) -> bool {
+        let Self { free, chopped, reduced, defect, free_hp, tangent } = self;
+        [free, chopped, reduced, defect, free_hp, tangent].iter().all(|v| v.is_finite())
+    }
+
+    /// By the projected gradient phi + beta.
+    fn norms(&self) -> Norms {
+        Norms { gradient: (self.free + self.chopped).sqrt(), defect: self.defect.sqrt() }
+    }
+
+    /// The proportioning test |beta|^2 <= Gamma^2 phi~'phi.
+    fn is_proportional(&self) -> bool {
+        self.chopped <= PROPORTION * PROPORTION * self.reduced
+    }
+}
+
 /// The cost along a direction p: p'H p, p'g, and the longest step in the set.
 struct Line {
     curvature: f64,
     slope: f64,
     reach: f64,
+}
+
+impl Line {
+    /// The step to the minimum.
+    fn step(&self) -> f64 {
+        if self.curvature > 0.0 { self.slope / self.curvature } else { f64::INFINITY }
+    }
 }
 
 /// The solver: its problem apart from H and b, and its work space.
@@ -75,12 +118,15 @@ pub struct Mprgp<'a> {
     norm: f64,
     products: usize,
     parts: Parts,
+    /// Size of the Hessian without its penalty.
+    size: f64,
     p: Vec<f64>,
     hp: Vec<f64>,
     defect: Vec<f64>,
     z: Vec<f64>,
     old: Vec<f64>,
     old_gradient: Vec<f64>,
+    way: Vec<f64>,
 }
 
 impl<'a> Mprgp<'a> {
@@ -91,6 +137,7 @@ impl<'a> Mprgp<'a> {
             space,
             set,
             norm,
+            size: norm,
             products,
             parts: Parts::new(set.dimension()),
             p: zero(),
@@ -99,7 +146,14 @@ impl<'a> Mprgp<'a> {
             z: zero(),
             old: zero(),
             old_gradient: zero(),
+            way: Vec::new(),
         }
+    }
+
+    /// Tells the size of the Hessian without its penalty, if it has one: what the curvature of circles is compared with.
+    pub fn with_size(mut self, size: f64) -> Self {
+        self.size = size;
+        self
     }
 
     /// Iterates from a feasible point with a valid gradient until `stop` says so.
@@ -116,35 +170,42 @@ impl<'a> Mprgp<'a> {
         loop {
             // Stopping tests, by the projected gradient phi + beta.
             let squares = self.measure(point);
-            if !squares.iter().all(|v| v.is_finite()) {
+            if !squares.is_finite() {
                 return Outcome::NotFinite;
             }
-            let [free, chopped, reduced_free, defect, free_hp] = squares;
-            if stop(Norms { gradient: (free + chopped).sqrt(), defect: defect.sqrt() }) {
+            if stop(squares.norms()) {
                 return Outcome::Converged;
             }
             if statistics.hessian >= self.products {
                 return Outcome::LimitReached;
             }
 
-            // Proportioning test |beta|^2 <= Gamma^2 phi~'phi: a CG direction in the face, or one that leaves it along beta.
-            let proportional = chopped <= PROPORTION * PROPORTION * reduced_free;
+            // A CG direction in the face, or one that leaves it along beta.
+            let proportional = squares.is_proportional();
+            if proportional && squares.tangent > 0.0 {
+                if let Some(outcome) = self.slide(hessian, b, point, squares, statistics, stop) {
+                    return outcome;
+                }
+                last = None;
+                continue;
+            }
             if proportional {
-                self.conjugate(hessian, &point.x, (free, free_hp), last, statistics);
+                self.conjugate(hessian, &point.x, &squares, last, statistics);
             } else {
                 self.p.copy_from_slice(&self.parts.chopped);
             }
 
             // The step to the minimum along p, and the one to the boundary of the set.
-            let Some(Line { curvature, slope, reach }) = self.line(hessian, point, statistics) else {
+            let Some(line) = self.line(hessian, point, statistics) else {
                 return Outcome::NotFinite;
             };
+            let Line { curvature, slope, reach } = line;
             if slope <= 0.0 && last.is_some() {
                 // Conjugacy is lost in rounding: CG starts anew.
                 last = None;
                 continue;
             }
-            let step = if curvature > 0.0 { slope / curvature } else { f64::INFINITY };
+            let step = line.step();
             if step.min(reach) == f64::INFINITY {
                 return Outcome::Unbounded;
             }
@@ -162,48 +223,57 @@ impl<'a> Mprgp<'a> {
         }
     }
 
-    /// Splits the gradient at the point; returns phi'phi, beta'beta, phi~'phi, the square of the defect, and phi'H p with the last
-    /// `H p`. One collective.
-    fn measure(&mut self, point: &Point) -> [f64; 5] {
+    /// Splits the gradient at the point. One collective.
+    fn measure(&mut self, point: &Point) -> Squares {
         self.set.split(&point.x, &point.gradient, FIXED_STEP / self.norm, &mut self.parts);
-        let Parts { free, chopped, reduced } = &self.parts;
+        self.squares(point)
+    }
+
+    /// Squares and products of the split gradient. One collective.
+    fn squares(&self, point: &Point) -> Squares {
+        let Parts { free, chopped, reduced, tangent, .. } = &self.parts;
         let defect = &point.defect;
-        let d =
-            self.space.dots(&[(free, free), (chopped, chopped), (reduced, free), (defect, defect), (free, &self.hp)]);
-        [d[0], d[1], d[2], d[3], d[4]]
+        let mut pairs: Vec<(&[f64], &[f64])> =
+            vec![(free, free), (chopped, chopped), (reduced, free), (defect, defect), (free, &self.hp)];
+        if self.set.has_discs() {
+            pairs.push((tangent, tangent));
+        }
+        let d = self.space.dots(&pairs);
+        let tangent = d.get(5).copied().unwrap_or(0.0);
+        Squares { free: d[0], chopped: d[1], reduced: d[2], defect: d[3], free_hp: d[4], tangent }
     }
 
     /// The cost along the direction p, by one product with H; `None` if something is not finite.
     fn line(&mut self, hessian: &mut dyn Hessian, point: &Point, statistics: &mut Statistics) -> Option<Line> {
-        let reach = self.space.minimum(self.set.reach(&point.x, &self.p));
+        let reach = self.space.minimum(self.set.reach(&self.parts.places, &point.x, &self.p));
         hessian.apply(&self.p, &mut self.hp, &mut self.defect);
         statistics.hessian += 1;
+        self.set.bend(&self.parts.places, &self.p, &mut self.hp);
         let d = self.space.dots(&[(&self.p, &self.hp), (&self.p, &point.gradient)]);
         let (curvature, slope) = (d[0], d[1]);
         (curvature.is_finite() && slope.is_finite() && !reach.is_nan()).then_some(Line { curvature, slope, reach })
     }
 
-    /// A step of this length along p that stays in the set; gradient and defect follow without a product.
+    /// A step of this length along p that stays in the set, or on tangents; gradient and defect follow without a product.
     fn walk(&mut self, point: &mut Point, step: f64) {
-        self.set.advance(&mut point.x, step, &self.p);
+        self.set.advance_on_tangents(&self.parts.places, &mut point.x, step, &self.p);
         axpy(-step, &self.hp, &mut point.gradient);
         axpy(-step, &self.defect, &mut point.defect);
         point.age += 1;
     }
 
-    /// The next CG direction: the (preconditioned) free gradient, H-conjugate to the last direction if there is one. Given
-    /// are phi'phi and phi'H p.
+    /// The next CG direction: the (preconditioned) free gradient, H-conjugate to the last direction if there is one.
     fn conjugate(
         &mut self,
         hessian: &mut dyn Hessian,
         x: &[f64],
-        (free_free, free_hp): (f64, f64),
+        squares: &Squares,
         last: Option<f64>,
         statistics: &mut Statistics,
     ) {
-        let mut z_hp = free_hp;
+        let mut z_hp = squares.free_hp;
         let mut z = &self.parts.free;
-        if free_free > 0.0 && hessian.precondition(&self.parts.free, &mut self.z) {
+        if squares.free > 0.0 && hessian.precondition(&self.parts.free, &mut self.z) {
             statistics.preconditioner += 1;
             self.set.mask(x, &mut self.z);
             let d = self.space.dots(&[(&self.z, &self.hp), (&self.z, &self.parts.free)]);
@@ -233,7 +303,7 @@ impl<'a> Mprgp<'a> {
         if step.is_finite() {
             self.set.advance(&mut point.x, step, &self.p);
             point.refresh(hessian, b, statistics);
-            if self.lowered(point) {
+            if self.lowered(point, 0.0) {
                 return;
             }
         }
@@ -241,30 +311,41 @@ impl<'a> Mprgp<'a> {
         // To the bound, where the gradient costs nothing; from there a gradient step.
         self.set.advance(&mut self.old, reach, &self.p);
         axpy(-reach, &self.hp, &mut self.old_gradient);
+        self.descend(hessian, b, point, statistics);
+    }
+
+    /// A gradient step of fixed length from `old`, which lowers the cost if it is short enough. Pairs on circles take part: the
+    /// projection makes a step along the circle of theirs.
+    fn descend(&mut self, hessian: &mut dyn Hessian, b: &[f64], point: &mut Point, statistics: &mut Statistics) {
         self.parts.free.copy_from_slice(&self.old_gradient);
-        self.set.mask(&self.old, &mut self.parts.free);
+        self.set.mask_bounds(&self.old, &mut self.parts.free);
+        let norm = self.norm;
         for _ in 0..=DOUBLINGS {
             point.x.copy_from_slice(&self.old);
             self.set.advance(&mut point.x, FIXED_STEP / self.norm, &self.parts.free);
             point.refresh(hessian, b, statistics);
-            if self.lowered(point) {
+            if self.lowered(point, 0.0) {
                 return;
             }
             self.norm *= 2.0;
         }
+        if self.set.has_discs() {
+            // Not the norm was wrong: rounding is felt on circles, and hides whether the cost falls.
+            self.norm = norm;
+        }
     }
 
-    /// Whether the cost has not risen from `old` to the point: the difference is (x - old)'(g + old g) / 2, free of the
-    /// cancellation that the difference of two costs would suffer.
-    fn lowered(&mut self, point: &Point) -> bool {
-        for ((z, x), old) in self.z.iter_mut().zip(&point.x).zip(&self.old) {
-            *z = x - old;
-        }
+    /// Whether the cost has fallen by this at least from `old` to the point: the difference is (x - old)'(g + old g) / 2, free of
+    /// the cancellation that the difference of two costs would suffer.
+    fn lowered(&mut self, point: &Point, least: f64) -> bool {
+        self.set.difference(&point.x, &self.old, &mut self.z);
         let d = self.space.dots(&[(&self.z, &point.gradient), (&self.z, &self.old_gradient)]);
         // NaN ends the loop at the next test.
-        d[0] + d[1] <= 0.0 || d[0].is_nan()
+        d[0] + d[1] <= -2.0 * least || d[0].is_nan()
     }
 }
+
+mod slide;
 
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,5 @@
 //! SMALSE-M: bounds and equalities by augmented Lagrangians, min 1/2 x'A x - x'b over { x >= l, G x = 0 }.
+//! Pairs of entries may be in discs instead of above bounds: the set is whatever [`super::feasible`] says.
 //!
 //! Dostal, Optimal Quadratic Programming Algorithms (2009), algorithm 8.2 (semimonotonic augmented Lagrangians, fixed
 //! penalty, M updated). The equality constraint is taken orthonormalised and is never formed: with P the projector onto
@@ -38,7 +39,7 @@ pub struct Problem<'a> {
     pub function: &'a mut dyn Quadratic,
     /// b; only P b matters.
     pub b: &'a [f64],
-    /// { x >= l }.
+    /// { x >= l }, with discs perhaps.
     pub set: &'a FeasibleSet,
 }
 
@@ -61,13 +62,14 @@ pub struct Start {
 
 /// What was found.
 pub struct Solution {
-    /// The unknowns: x >= l holds exactly, G x = 0 within `defect_norm`.
+    /// The unknowns: x >= l holds exactly, discs up to rounding, G x = 0 within `defect_norm`.
     pub x: Vec<f64>,
-    /// `P (A P x - b) + m`: up to the tolerance zero on the free set, nonnegative on the active one.
+    /// `P (A P x - b) + m`: up to the tolerance zero on the free set, nonnegative on the active one;
+    /// on circles it points at the centre.
     pub gradient: Vec<f64>,
     /// The equality multiplier m that belongs to the gradient.
     pub multiplier: Vec<f64>,
-    /// Which entries are on their bound.
+    /// Which entries are on their bound or their circle.
     pub active: Vec<bool>,
     /// How it ended.
     pub outcome: Outcome,
@@ -88,7 +90,7 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let norm = settings.norm;
     let penalty = PENALTY * norm;
     let mut hessian = Penalised { function, penalty, inside };
-    let mut inner = Mprgp::new(space, set, penalty, settings.limits.products);
+    let mut inner = Mprgp::new(space, set, penalty, settings.limits.products).with_size(norm);
     let mut statistics = Statistics::default();
     let mut point = first_point(space, &mut hessian, &right, x, &mut statistics);
 

@@ -110,7 +110,7 @@ fn the_safe_expansion_lowers_the_cost() {
         solver.p.copy_from_slice(&point.gradient);
         let (p, mut defect) = (solver.p.clone(), vec![0.0; n]);
         hessian.apply(&p, &mut solver.hp, &mut defect);
-        let reach = set.reach(&point.x, &p).min(0.1);
+        let reach = set.reach(&[], &point.x, &p).min(0.1);
         solver.expand(&mut hessian, &b, &mut point, &mut statistics, f64::INFINITY, reach);
         let after = cost.cost(&point.x, &b);
         assert!(after < before, "case {case}: {after} after {before}");

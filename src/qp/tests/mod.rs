@@ -2,4 +2,5 @@
 
 mod bits;
 pub mod dense;
+mod discs;
 pub mod torn;
