@@ -3,4 +3,5 @@
 mod bits;
 pub mod dense;
 mod discs;
+mod ranks;
 pub mod torn;
