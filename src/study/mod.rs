@@ -8,6 +8,7 @@ pub mod adaptive;
 pub mod cascade;
 pub mod contact;
 mod fields;
+mod goal;
 mod limit;
 mod limits;
 mod recorder;
@@ -48,6 +49,9 @@ pub enum StudyError {
     /// It has no discrete problem.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The number whose error is asked for does not exist.
+    #[error(transparent)]
+    Goal(#[from] goal::GoalError),
     /// The watcher asked to stop between two Newton steps.
     #[error("stopped on request")]
     Stopped,
@@ -120,7 +124,8 @@ pub fn solve(
     let (conditions, stages) = model::history::stages(scene, discrete, &|| connection.gather.zeros());
     let solver = solver::step_solver(scene, discrete, comm, &connection, &stages, timer)?;
     let mut problem = TornProblem::new(discrete, &connection, &sums, conditions);
-    let mut recorder = Recorder::new(scene, discrete, comm);
+    let goal = goal::Goal::new(scene, discrete, comm, &|| connection.gather.zeros())?;
+    let mut recorder = Recorder::new(scene, discrete, comm, goal);
     let begin = enter(begin, &mut problem, &mut recorder);
     let settings = solver::settings(scene);
     let growing = model::history::growing(scene, discrete, &|| connection.gather.zeros());

@@ -24,6 +24,7 @@ mod loads;
 mod many;
 mod memory;
 mod mortar;
+mod numbers;
 mod patch;
 mod ranks;
 mod refined;
