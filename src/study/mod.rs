@@ -11,6 +11,7 @@ mod fields;
 mod goal;
 mod limit;
 mod limits;
+mod named;
 mod recorder;
 mod report;
 mod solver;
@@ -144,6 +145,7 @@ pub fn solve(
         provenance: provenance::collect(comm, &scene.to_toml(), &mesh_names, &decomposition.shares, started),
         convergence: convergence(&summary.newton),
         state: restart::state::pack(&problem, meshes),
+        mesh: named::arrays(comm, scene, discrete),
     };
     let Recorder { piece, closed, .. } = recorder;
     Ok(Solved { summary, piece, records, u, closed, histories: problem.committed.histories })
