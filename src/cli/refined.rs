@@ -16,7 +16,7 @@ use crate::restart::checkpoint::Unfit;
 use crate::results::checkpoint::Checkpoint;
 use crate::scene::{ErrorOf, Scene};
 use crate::sizing::counts::Counted;
-use crate::study::adaptive::error::{estimate, is_history};
+use crate::study::adaptive::error::{estimate, is_history, is_known, vanishes};
 use crate::study::adaptive::start::{Start, start};
 use crate::study::adaptive::{Adaptive, marking, parts};
 use crate::study::{Begin, Solved};
@@ -66,14 +66,17 @@ impl Run<'_> {
                 plan.refinements.is_empty(),
                 began,
             ));
-            // Files have no infinite numbers.
-            let error = estimate(scene.solver.error_of, &plan.refinements).min(f64::MAX);
-            let row = plan.refinements.last_mut().expect("it was pushed");
-            row.error = error;
+            let row = with_error(plan, &scene.solver.error_of);
             monitor.event(&Event::Refinement { row: row.clone(), goal });
-            // An error of the energy is better known when meshes were compared.
-            let is_known =
-                plan.refinements.len() > 1 || scene.solver.error_of != ErrorOf::Energy || is_history(&plan.refinements);
+            if row.goal.is_some_and(|number| vanishes(&number)) {
+                return Ok(given_up(
+                    (discrete, solved),
+                    plan,
+                    goal,
+                    "the number is zero, and errors are relative to it",
+                ));
+            }
+            let (error, is_known) = (row.error, is_known(&scene.solver.error_of, &plan.refinements));
             if error <= goal && (is_known || error * CLEARLY <= goal) {
                 return Ok((discrete, solved));
             }
@@ -157,6 +160,8 @@ impl Run<'_> {
             let values = steps.iter().filter_map(|step| of(&step.state));
             values.filter(|value| value.is_finite()).reduce(f64::max)
         };
+        let of_duals: u64 =
+            summary.steps.iter().filter_map(|row| row.goal).map(|goal| goal.hessian_multiplications).sum();
         let energy =
             steps.last().and_then(|row| row.state.energy).filter(|energy| energy.is_finite()).unwrap_or_default()
                 + of_limit;
@@ -171,12 +176,13 @@ impl Run<'_> {
             } else {
                 largest(|state| state.energy.map(f64::abs)).unwrap_or_default()
             },
-            distance: marking::total(self.comm, &parts(discrete, solved, ErrorOf::Energy)),
+            distance: marking::total(self.comm, &parts(discrete, solved, &ErrorOf::Energy)),
             gap: largest(|state| state.errors.duality_gap).unwrap_or_default(),
             stress: largest(|state| state.errors.discretisation).unwrap_or(f64::MAX),
             limit_load,
+            goal: steps.last().and_then(|row| row.goal),
             newton_iterations: summary.newton_iterations,
-            hessian_multiplications: summary.counters.hessian_multiplications,
+            hessian_multiplications: summary.counters.hessian_multiplications.map(|count| count + of_duals),
             seconds: self.timer.total_seconds() - began,
         }
     }
@@ -194,12 +200,15 @@ impl Run<'_> {
         }
         let row = plan.refinements.last().expect("a mesh was solved on");
         let share = scene.solver.error.map_or(1.0, |goal| AIM * goal / row.error).clamp(SHARE, SMALLER[2]);
-        let share = match scene.solver.error_of {
-            ErrorOf::Energy => share,
+        let of = &scene.solver.error_of;
+        let share = match of {
+            // Nearly the same mesh would not tell more.
+            ErrorOf::Goal(_) if !is_known(of, &plan.refinements) => SHARE,
+            ErrorOf::Energy | ErrorOf::Goal(_) => share,
             // Its parts are squares.
             ErrorOf::Stress => share.max(SHARE.sqrt()).powi(2),
         };
-        let parts = parts(discrete, solved, scene.solver.error_of);
+        let parts = parts(discrete, solved, of);
         let mut limit = String::new();
         for share in std::iter::once(share).chain(SMALLER.into_iter().filter(|&smaller| smaller > share)) {
             let mut finer = adaptive.clone();
@@ -234,11 +243,22 @@ impl Run<'_> {
     }
 }
 
+/// The row of the last mesh, with its error.
+fn with_error(plan: &mut Plan, of: &ErrorOf) -> RefinementRow {
+    // Files have no infinite numbers.
+    let error = estimate(of, &plan.refinements).min(f64::MAX);
+    let row = plan.refinements.last_mut().expect("a mesh was solved on");
+    row.error = error;
+    row.clone()
+}
+
 /// The result of the mesh before, and why there is no better one.
 fn given_up((discrete, mut solved): (Discrete, Solved), plan: &Plan, goal: f64, reason: &str) -> (Discrete, Solved) {
     let found = plan.refinements.last().map_or(f64::MAX, |row| row.error);
     solved.summary.converged = Some(false);
-    solved.summary.error =
-        Some(format!("the error is about {:.2} %, not {:.2} %: {reason}", 100.0 * found, 100.0 * goal));
+    solved.summary.error = Some(match found {
+        f64::MAX => format!("the error is not known: {reason}"),
+        found => format!("the error is about {:.2} %, not {:.2} %: {reason}", 100.0 * found, 100.0 * goal),
+    });
     (discrete, solved)
 }

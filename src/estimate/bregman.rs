@@ -13,7 +13,7 @@
 //! It is an estimate, no bound: the recovered strain lies between that of the elements and the exact one where this is singular, so
 //! the distance is too small there; how much so hardly changes from mesh to mesh.
 
-use super::{integrals, interpolated, recovery, rule};
+use super::{between, integrals, interpolated, nearest, recovery, rule};
 use crate::assembly::Region;
 use crate::assembly::stress;
 use crate::assembly::visit::LAW;
@@ -33,18 +33,14 @@ pub fn distances(sums: &NodeSums, regions: &[Region], u: &Torn) -> Vec<Vec<f64>>
         let points = elements.kind().points();
         work::each(elements.len() * rule.len(), 12 * (elements.kind().nodes() + points) + 2 * LAW, 0);
         let samples = stress::strains(region, u);
-        integrals(elements, &samples, &rule, |index, nodes, samples, place| {
-            let mut strain = [0.0; 6];
-            for (c, sample) in place.samples.iter().zip(samples) {
-                strain.iter_mut().zip(sample.value).for_each(|(strain, s)| *strain += c * s);
-            }
+        let distances = integrals(elements, &samples, &rule, |index, nodes, samples, place| {
+            let strain = between(samples, place);
             let mut change = interpolated(nodal, nodes, &place.nodes);
             change.iter_mut().zip(strain).for_each(|(change, s)| *change -= s);
-            // The history is that of the nearest point.
-            let nearest = (0..points).max_by(|&a, &b| place.samples[a].total_cmp(&place.samples[b]));
-            let history = region.committed(points * index + nearest.expect("elements have points"));
-            region.material.divergence(&strain, &change, history)
-        })
+            let history = region.committed(points * index + nearest(place));
+            [region.material.divergence(&strain, &change, history)]
+        });
+        distances.into_iter().flatten().collect()
     };
     regions.iter().zip(u).zip(&recovered).map(of).collect()
 }

@@ -27,6 +27,7 @@ pub mod bregman;
 mod polynomial;
 mod recovery;
 mod rule;
+pub mod weighted;
 
 use self::rule::Place;
 use crate::assembly::Region;
@@ -76,22 +77,39 @@ fn interpolated(nodal: &[Voigt], nodes: &[u32], values: &[f64]) -> Voigt {
     sum
 }
 
-/// The integral over each element of a density, which is told of the number of the element, its nodes, its samples and a place
+/// The integrals over each element of densities, which are told of the number of the element, its nodes, its samples and a place
 /// of the rule.
-fn integrals(
+fn integrals<const N: usize>(
     elements: &Elements,
     samples: &[Sample],
     rule: &[Place],
-    density: impl Fn(usize, &[u32], &[Sample], &Place) -> f64,
-) -> Vec<f64> {
+    densities: impl Fn(usize, &[u32], &[Sample], &Place) -> [f64; N],
+) -> Vec<[f64; N]> {
     let of_element = |(index, (nodes, samples)): (usize, (&[u32], &[Sample]))| {
-        let at = |place: &Place| {
+        let mut sums = [0.0; N];
+        for place in rule {
             let volume: f64 = place.volume.iter().zip(samples).map(|(c, s)| c * s.weight).sum();
-            volume * density(index, nodes, samples, place)
-        };
-        rule.iter().map(at).sum()
+            let densities = densities(index, nodes, samples, place);
+            sums.iter_mut().zip(densities).for_each(|(sum, density)| *sum += volume * density);
+        }
+        sums
     };
     elements.iter().zip(samples.chunks_exact(elements.kind().points())).enumerate().map(of_element).collect()
+}
+
+/// What samples of an element are at a place of the rule.
+fn between(samples: &[Sample], place: &Place) -> Voigt {
+    let mut value = [0.0; 6];
+    for (c, sample) in place.samples.iter().zip(samples) {
+        value.iter_mut().zip(sample.value).for_each(|(value, s)| *value += c * s);
+    }
+    value
+}
+
+/// The number of the integration point that is nearest to a place of the rule.
+fn nearest(place: &Place) -> usize {
+    let points = 0..place.samples.len();
+    points.max_by(|&a, &b| place.samples[a].total_cmp(&place.samples[b])).expect("elements have points")
 }
 
 /// How far the stresses at `u` are from others, integrated by a rule: `stress` gives these from the number of an own subdomain, the
@@ -122,13 +140,14 @@ fn squares(region: &Region, samples: &[Sample], rule: &[Place], stress: impl Fn(
     let of_place = 12 * (elements.kind().nodes() + elements.kind().points()) + 30;
     work::each(elements.len() * rule.len(), of_place, 0);
     work::each(samples.len(), 0, size_of::<Sample>());
-    integrals(elements, samples, rule, |_, nodes, samples, place| {
+    let squares = integrals(elements, samples, rule, |_, nodes, samples, place| {
         let mut difference = stress(nodes, &place.nodes);
         for (c, sample) in place.samples.iter().zip(samples) {
             difference.iter_mut().zip(sample.value).for_each(|(d, s)| *d -= c * s);
         }
-        region.material.hooke().complementary_square(&difference)
-    })
+        [region.material.hooke().complementary_square(&difference)]
+    });
+    squares.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

@@ -213,3 +213,41 @@ fn the_bregman_distance_is_between_nothing_and_the_elastic_one() {
     });
     assert!(found[0].0 > 0.0 && found[0].1 > 0.0);
 }
+
+/// A cube beside two points that stretch it, and the strains of both.
+#[test]
+fn weighted_errors_are_near_the_product_of_the_true_ones() {
+    let at = |centre: [f64; 3]| move |x: [f64; 3]| std::array::from_fn(|i| x[i] - centre[i]);
+    let [of_u, of_z] = [at([-0.4, 0.3, 0.2]), at([0.1, 0.6, -0.5])];
+    let c = orders::MATERIAL.hooke().tangent();
+    for (kind, cells) in [(Kind::Tet4, 6), (Kind::Tet10, 3), (Kind::Tet10, 6)] {
+        let cube = orders::cube(kind, cells);
+        let [u, z] = [of_u, of_z].map(|at| orders::displacement(&cube, |_| [0.0; 3], |x| lame(at(x))));
+        let shares = Shares::new(vec![1]);
+        let clusters = Clusters::new(shares.total(), &[]);
+        let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
+        let (sums, region) = (NodeSums::new(&Solo, &alone), [Region::virgin(&cube, &orders::MATERIAL)]);
+        // a(e_u, e_z) is a quarter of the squares of sum and difference.
+        let square = |sign: f64| {
+            let both = u.iter().zip(&z).map(|(u, z)| u + sign * z).collect();
+            let strain = |x| {
+                let (of_u, of_z) = (lame_strain(of_u(x)), lame_strain(of_z(x)));
+                std::array::from_fn(|k| of_u[k] + sign * of_z[k])
+            };
+            error(&region, &vec![both], |_, x| apply(&c, &strain(x))).errors[0].iter().sum::<f64>()
+        };
+        let exact = 0.25 * (square(1.0) - square(-1.0));
+        let weighted::Weighted { signed, sizes } = weighted::weighted(&sums, &region, &vec![u.clone()], &vec![z]);
+        let sum: f64 = signed[0].iter().sum();
+        println!("{kind:?} {cells}: {sum} {exact}");
+        assert!(sum / exact > 0.5 && sum / exact < 2.0, "{kind:?}: {sum} {exact}");
+        assert!(signed[0].iter().zip(&sizes[0]).all(|(signed, size)| signed.abs() <= size * (1.0 + 1e-9)));
+
+        // The solution is its own weight for its energy.
+        let own = weighted::weighted(&sums, &region, &vec![u.clone()], &vec![u.clone()]);
+        let distances = bregman::distances(&sums, &region, &vec![u]);
+        for ((signed, size), distance) in own.signed[0].iter().zip(&own.sizes[0]).zip(&distances[0]) {
+            assert!((signed - 2.0 * distance).abs() < 1e-9 * size && (signed - size).abs() < 1e-9 * size);
+        }
+    }
+}

@@ -122,10 +122,11 @@ fn contact_line(ContactRow { name, slave, master, rule, conditions }: &ContactRo
 }
 
 fn refinement_line(row: &RefinementRow, goal: f64) -> String {
-    let RefinementRow { elements, unknowns, error, energy, seconds, .. } = row;
+    let RefinementRow { elements, unknowns, error, energy, seconds, goal: number, .. } = row;
+    let number = number.map(|number| format!("Q = {:.6e}, ", number.value)).unwrap_or_default();
+    let error = if *error < f64::MAX { format!("about {:.2} %", 100.0 * error) } else { "not known".to_owned() };
     format!(
-        "mesh of {elements} elements, {unknowns} unknowns: J = {energy:.6e}, error about {:.2} % ({:.2} % wanted), {seconds:.2} s",
-        100.0 * error,
+        "mesh of {elements} elements, {unknowns} unknowns: J = {energy:.6e}, {number}error {error} ({:.2} % wanted), {seconds:.2} s",
         100.0 * goal
     )
 }

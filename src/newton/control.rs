@@ -111,9 +111,9 @@ impl Control {
         (step, drop): (&mut Step, f64),
         timer: &Timer,
     ) -> Result<(), Outcome> {
-        let directions = take(&mut step.directions);
+        let (directions, closed) = (take(&mut step.directions), vec![0.0; step.lambda.len()]);
         let Response { v, lambda, outcome, statistics, applications } =
-            solver.response(problem, &self.along, drop, directions, timer);
+            solver.response(problem, (&self.along, &closed), drop, directions, timer);
         step.statistics += statistics;
         step.applications += applications;
         match outcome {

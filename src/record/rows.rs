@@ -22,6 +22,9 @@ pub struct StepRow {
     /// What it tells of the limit load, where that is sought.
     #[serde(default)]
     pub limit_load: Option<LimitLoad>,
+    /// The number whose error is asked for.
+    #[serde(default)]
+    pub goal: Option<GoalRow>,
     /// The state there.
     #[serde(flatten)]
     pub state: State,
@@ -50,6 +53,23 @@ impl LimitLoad {
     pub fn then(self, later: Self) -> Self {
         Self { lower: self.lower.max(later.lower), ..later }
     }
+}
+
+/// A number that is of interest, and what is known of its error; all in the unit of the number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GoalRow {
+    /// The number, on this mesh.
+    pub value: f64,
+    /// What recovered strains add to it.
+    pub correction: f64,
+    /// The same with the sizes of elements, which do not cancel.
+    pub distance: f64,
+    /// What the solver left of it in the solution; `value` has it no more.
+    pub gap: f64,
+    /// Sum of the sizes of the terms that it is a sum of.
+    pub terms: f64,
+    /// Applications of F for its dual solution.
+    pub hessian_multiplications: u64,
 }
 
 /// One Newton step.
@@ -107,6 +127,9 @@ pub struct RefinementRow {
     /// The limit load, where that is sought; the energy is then `J(u)` without the work of the loads that grow.
     #[serde(default)]
     pub limit_load: Option<LimitLoad>,
+    /// The number whose error is asked for; that of the last increment.
+    #[serde(default)]
+    pub goal: Option<GoalRow>,
     /// Newton steps.
     pub newton_iterations: Option<u64>,
     /// Every application of F.

@@ -25,6 +25,8 @@ pub struct Records {
     pub convergence: Vec<(String, Vec<f64>)>,
     /// Group `/state`: what another run can start from.
     pub state: State,
+    /// Group `/mesh`: names of volumes and surfaces, and the faces of these; the same names on every rank.
+    pub mesh: Vec<Field>,
 }
 
 /// What the material remembers at the end of a run.
@@ -41,7 +43,7 @@ impl Records {
         const DESCRIPTION: usize = 1024;
         let texts: usize = self.provenance.iter().map(|(_, text)| text.len() + DESCRIPTION).sum();
         let columns: usize = self.convergence.iter().map(|(_, column)| 8 * column.len() + DESCRIPTION).sum();
-        let states = self.state.arrays.iter().flat_map(|field| &field.states);
+        let states = self.state.arrays.iter().chain(&self.mesh).flat_map(|field| &field.states);
         let numbers: usize = states.map(|state| 8 * state.len() + DESCRIPTION).sum();
         (texts + columns + numbers + self.state.description.len()) as u64
     }
@@ -65,7 +67,8 @@ pub fn write(comm: &dyn Comm, path: &Path, piece: &Piece, records: &Records) -> 
         let gathered = piece.gather(comm);
         let arrays = records.state.arrays.iter().map(|field| field.gather(comm)).collect();
         let state = State { description: records.state.description.clone(), arrays };
-        let records = Records { state, ..records.clone() };
+        let mesh = records.mesh.iter().map(|field| field.gather(comm)).collect();
+        let records = Records { state, mesh, ..records.clone() };
         on_root(comm, "writing for all ranks", || match gathered {
             Some((whole, sizes)) => write_rows(&Solo, temporary, &whole, &sizes, &records),
             None => Ok(()),
@@ -163,7 +166,12 @@ fn put_records(comm: &dyn Comm, file: &SharedFile, records: &Records) -> Result<
     }
     file.group("state")?;
     file.text("state/description", &root_texts(comm, [&records.state.description[..]]).concat())?;
-    put_fields(file, "state", &records.state.arrays)
+    put_fields(file, "state", &records.state.arrays)?;
+    if records.mesh.is_empty() {
+        return Ok(());
+    }
+    file.group("mesh")?;
+    put_fields(file, "mesh", &records.mesh)
 }
 
 /// VTK's ids are signed.
@@ -211,6 +219,7 @@ mod tests {
             provenance: vec![("scene".into(), "title = \"Blöcke\"\n".into()), ("empty".into(), String::new())],
             convergence: vec![("step".into(), vec![1.0, 2.0]), ("criterion".into(), vec![0.5, f64::NAN])],
             state: State { description: "{}".into(), arrays: Vec::new() },
+            mesh: Vec::new(),
         }
     }
 

@@ -34,6 +34,7 @@ pub(super) fn scene(scene: &Scene) -> Checked {
     scene.limit.iter().try_for_each(|it| it.check(scene))?;
     decomposition(scene)?;
     solver(&scene.solver)?;
+    scene.solver.error_of.goal().map_or(Ok(()), |goal| goal.check(scene))?;
     scene.steps().iter().try_for_each(|step| compatible_supports(scene, step))?;
     scene.body.keys().try_for_each(|name| holding(scene, name))
 }

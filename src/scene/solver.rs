@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::goal::ErrorOf;
+
 /// Settings of Newton's method and of the quadratic programs inside it. All tolerances are relative.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -54,23 +56,6 @@ impl Default for Solver {
             preconditioner: Preconditioner::Dirichlet,
             precision: Precision::Mixed,
         }
-    }
-}
-
-/// What an error is of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ErrorOf {
-    /// The energy `J`, relative to it.
-    #[default]
-    Energy,
-    /// The stress, in the norm of its complementary energy, relative to the stress.
-    Stress,
-}
-
-impl ErrorOf {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
     }
 }
 

@@ -37,12 +37,12 @@ pub fn mesh(subdomains: &[Subdomain], rank: usize) -> Piece {
 }
 
 /// Adds the iterate to the mesh, at the time of its increment, with what may touch and the contact of the pairs whose rows are on this
-/// rank, and the Bregman distances of elements where these are known. Returns the largest von Mises stress in this rank's elements.
+/// rank, and what is known of the errors of elements. Returns the largest von Mises stress in this rank's elements.
 pub fn record(
     piece: &mut Piece,
     newton: &Newton,
     (touching, contact): (&Contacts, &[ContactState]),
-    distances: Option<Vec<Vec<f64>>>,
+    OfElements { distances, sizes }: OfElements,
 ) -> f64 {
     let (problem, Iterate { u, errors, .. }) = (newton.problem(), newton.iterate());
     let displacement: Vec<[f64; 3]> = u.iter().flat_map(|u| u.as_chunks::<3>().0).copied().collect();
@@ -60,6 +60,7 @@ pub fn record(
         Field::scalar(STRESS_ERROR, estimate),
     ];
     cell_data.extend(distances.map(|distances| Field::scalar(ENERGY_ERROR, distances.concat())));
+    cell_data.extend(sizes.map(|sizes| Field::scalar(GOAL_ERROR, sizes.concat())));
     piece.record(newton.at().time(), point_data, cell_data);
     largest
 }
@@ -68,6 +69,17 @@ pub fn record(
 pub const STRESS_ERROR: &str = "error_estimate";
 /// The field of Bregman distances.
 pub const ENERGY_ERROR: &str = "energy_error";
+/// The field of each element's part in the error of a number.
+pub const GOAL_ERROR: &str = "goal_error";
+
+/// What is known of the errors of elements of each own subdomain, if meshes are refined.
+#[derive(Default)]
+pub struct OfElements {
+    /// Bregman distances.
+    pub distances: Option<Vec<Vec<f64>>>,
+    /// Parts in the error of a number, without their signs.
+    pub sizes: Option<Vec<Vec<f64>>>,
+}
 
 /// The largest value of a field in each element of all increments that were recorded, subdomain by subdomain. None if there is no
 /// such field.

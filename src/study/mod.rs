@@ -8,8 +8,10 @@ pub mod adaptive;
 pub mod cascade;
 pub mod contact;
 mod fields;
+mod goal;
 mod limit;
 mod limits;
+mod named;
 mod recorder;
 mod report;
 mod solver;
@@ -48,6 +50,9 @@ pub enum StudyError {
     /// It has no discrete problem.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The number whose error is asked for does not exist.
+    #[error(transparent)]
+    Goal(#[from] goal::GoalError),
     /// The watcher asked to stop between two Newton steps.
     #[error("stopped on request")]
     Stopped,
@@ -120,7 +125,8 @@ pub fn solve(
     let (conditions, stages) = model::history::stages(scene, discrete, &|| connection.gather.zeros());
     let solver = solver::step_solver(scene, discrete, comm, &connection, &stages, timer)?;
     let mut problem = TornProblem::new(discrete, &connection, &sums, conditions);
-    let mut recorder = Recorder::new(scene, discrete, comm);
+    let goal = goal::Goal::new(scene, discrete, comm, &|| connection.gather.zeros())?;
+    let mut recorder = Recorder::new(scene, discrete, comm, goal);
     let begin = enter(begin, &mut problem, &mut recorder);
     let settings = solver::settings(scene);
     let growing = model::history::growing(scene, discrete, &|| connection.gather.zeros());
@@ -139,6 +145,7 @@ pub fn solve(
         provenance: provenance::collect(comm, &scene.to_toml(), &mesh_names, &decomposition.shares, started),
         convergence: convergence(&summary.newton),
         state: restart::state::pack(&problem, meshes),
+        mesh: named::arrays(comm, scene, discrete),
     };
     let Recorder { piece, closed, .. } = recorder;
     Ok(Solved { summary, piece, records, u, closed, histories: problem.committed.histories })

@@ -1,12 +1,14 @@
 //! What is written of each increment that is reached: its fields, its row, and the contacts that are closed in the end.
 
+use super::goal::Goal;
 use super::{fields, report};
 use crate::comm::Comm;
+use crate::decomposition::Subdomain;
 use crate::estimate::bregman;
 use crate::model::Discrete;
 use crate::monitor::timing::Timer;
-use crate::newton::Newton;
-use crate::record::rows::StepRow;
+use crate::newton::{self, Newton};
+use crate::record::rows::{GoalRow, StepRow};
 use crate::results::piece::Piece;
 use crate::scene::Scene;
 
@@ -15,6 +17,8 @@ pub(super) struct Recorder<'a> {
     scene: &'a Scene,
     discrete: &'a Discrete,
     comm: &'a dyn Comm,
+    /// The number whose error is asked for.
+    goal: Option<Goal>,
     /// This rank's mesh and fields.
     pub piece: Piece,
     /// Fields of points and of cells that belong to the mesh and never change.
@@ -27,10 +31,10 @@ pub(super) struct Recorder<'a> {
 
 impl<'a> Recorder<'a> {
     /// Nothing is reached yet.
-    pub fn new(scene: &'a Scene, discrete: &'a Discrete, comm: &'a dyn Comm) -> Self {
+    pub fn new(scene: &'a Scene, discrete: &'a Discrete, comm: &'a dyn Comm, goal: Option<Goal>) -> Self {
         let piece = fields::mesh(&discrete.decomposition.subdomains, comm.rank());
         let fixed = [piece.point_data.len(), piece.cell_data.len()];
-        Self { scene, discrete, comm, piece, fixed, rows: Vec::new(), closed: Vec::new() }
+        Self { scene, discrete, comm, goal, piece, fixed, rows: Vec::new(), closed: Vec::new() }
     }
 
     /// Goes on after increments whose rows and fields are known.
@@ -49,20 +53,30 @@ impl<'a> Recorder<'a> {
     }
 
     /// Takes down where an iteration ended. Collective.
-    pub fn record(&mut self, newton: &Newton, timer: &Timer) {
+    pub fn record(&mut self, newton: &mut Newton, timer: &Timer) {
+        let is_there = newton.outcome() == Some(&newton::Outcome::Converged);
+        let measured = self.goal.as_mut().filter(|_| is_there).and_then(|goal| goal.measure(newton, timer));
         // The potential is that of the step, so its distances are measured before the step is committed.
         let distances = self.scene.solver.error.map(|_| {
             let (problem, u) = (newton.problem(), &newton.iterate().u);
             timer.time("error estimate", || bregman::distances(problem.sums, &problem.regions(), u))
         });
-        timer.time("records", || self.record_results(newton, distances));
+        let (goal, mut sizes) = measured.unzip();
+        if goal.is_none() && self.goal.is_some() {
+            // Every increment has the same fields.
+            let unknown = |s: &Subdomain| vec![f64::NAN; s.elements.len()];
+            sizes = Some(self.discrete.decomposition.subdomains.iter().map(unknown).collect());
+        }
+        let of_elements = fields::OfElements { distances, sizes };
+        timer.time("records", || self.record_results(newton, goal, of_elements));
     }
 
-    fn record_results(&mut self, newton: &Newton, distances: Option<Vec<Vec<f64>>>) {
-        let Self { scene, discrete, comm, .. } = *self;
+    fn record_results(&mut self, newton: &Newton, goal: Option<GoalRow>, of_elements: fields::OfElements) {
+        let (scene, discrete, comm) = (self.scene, self.discrete, self.comm);
         let contact = report::contact_states(newton.problem(), newton.iterate());
-        let von_mises = fields::record(&mut self.piece, newton, (&discrete.contacts, &contact), distances);
-        self.rows.push(report::step_row(comm, scene, discrete, newton, &contact, von_mises));
+        let von_mises = fields::record(&mut self.piece, newton, (&discrete.contacts, &contact), of_elements);
+        let row = report::step_row(comm, scene, discrete, newton, &contact, von_mises);
+        self.rows.push(StepRow { goal, ..row });
         self.closed = contact.iter().filter(|state| state.status.is_closed()).map(|state| state.pair as u64).collect();
     }
 }

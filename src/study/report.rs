@@ -54,6 +54,7 @@ pub(super) fn step_row(
         halvings: at.halvings as u64,
         converged,
         limit_load: bounds.map(|newton::Bounds { lower, upper, work }| LimitLoad { lower, upper, factor: lower, work }),
+        goal: None,
         state: State { measures, ..state(scene, discrete, newton, contact, von_mises) },
     }
 }
@@ -242,6 +243,14 @@ fn qp_name(scene: &Scene, has_inequalities: bool) -> &'static str {
     }
 }
 
+/// Of each contact, 1 if the surface that the scene names first is the slave, else -1.
+pub(super) fn signs(scene: &Scene, discrete: &Discrete) -> Vec<f64> {
+    let is_slave = |(contact, row): (&scene::Contact, &ContactRow)| {
+        contact.surfaces().next().is_some_and(|first| first.to_string() == row.slave)
+    };
+    scene.contact.values().zip(&discrete.contacts.rows).map(|of| if is_slave(of) { 1.0 } else { -1.0 }).collect()
+}
+
 /// Force of each contact on the surface that the scene names first.
 fn contact_forces(
     scene: &Scene,
@@ -249,12 +258,7 @@ fn contact_forces(
     discrete: &Discrete,
     contact: &[ContactState],
 ) -> Vec<[f64; 3]> {
-    let Contacts { names, pairs, rows, .. } = &discrete.contacts;
-    let is_slave = |(contact, row): (&scene::Contact, &ContactRow)| {
-        contact.surfaces().next().is_some_and(|first| first.to_string() == row.slave)
-    };
-    let signs = scene.contact.values().zip(rows).map(|of| if is_slave(of) { 1.0 } else { -1.0 });
-    let signs: Vec<f64> = signs.collect();
+    let (Contacts { names, pairs, .. }, signs) = (&discrete.contacts, signs(scene, discrete));
     let of_pair: HashMap<usize, f64> = contact.iter().map(|state| (state.pair, state.force)).collect();
     let mut partial = Vec::new();
     for rows in problem.space.owned() {

@@ -1,6 +1,7 @@
 //! Tests of the whole program as users run it, alone and under `mpirun`. One binary, so that linking is paid once and
 //! short runs fill the gaps between long ones.
 
+mod again;
 mod bad_input;
 mod bad_mesh;
 mod benchmark;
@@ -24,6 +25,7 @@ mod loads;
 mod many;
 mod memory;
 mod mortar;
+mod numbers;
 mod patch;
 mod ranks;
 mod refined;

@@ -5,7 +5,7 @@
 //! body out of it. Of large binary files of version 4.1 each rank reads its own bytes (`ranges`); others rank 0 reads, and
 //! deals them out (`deal`). Files of VTKHDF are taken for such meshes too (`vtkhdf`). Points, lines, node data,
 //! periodicity and parametric coordinates are read over. Files come from users, so nothing in them is trusted: memory
-//! follows what is there, not what is announced.
+//! follows what is there, not what is announced. Results of this program are such files, with names (`own`).
 
 mod deal;
 pub mod error;
@@ -13,6 +13,7 @@ mod groups;
 mod kind;
 mod nodes;
 mod numbers;
+pub mod own;
 mod ranges;
 mod sections;
 mod source;

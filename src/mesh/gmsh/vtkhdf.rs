@@ -3,9 +3,10 @@
 //! A file may be in pieces, as parallel programs write them. Each rank reads consecutive points and consecutive cells, whatever
 //! pieces they are in. Nodes that several pieces have are one node if `PointData/GlobalPointIds` says so; without it pieces have
 //! nothing in common. Cells are of the group that an integer array in `CellData` gives: `gmsh:physical`, `PhysicalIds` or
-//! `group`; without one all are of group 1. Groups have no names, so scenes call them by their numbers.
+//! `group`; without one all are of group 1. Groups have no names, so scenes call them by their numbers. Results of this program have
+//! names and surfaces, and their nodes have numbers ([`super::own`]); their mesh is that of all time steps.
 //!
-//! Read are linear cells and tetrahedra of ten nodes, and triangles and quadrangles for surfaces; of files with several time steps
+//! Read are linear cells and tetrahedra of ten nodes, and triangles and quadrangles for surfaces; of other files with several time steps
 //! nothing.
 
 use std::ops::Range;
@@ -15,9 +16,10 @@ use hdf5_metno::{File, Group, H5Type};
 
 use super::error::Problem;
 use super::kind::Kind;
+use super::own::{self, Names};
 use super::{Block, Msh};
 use crate::comm::agree::agree;
-use crate::comm::meeting::{ask, home};
+use crate::comm::meeting::{ask, home, look_up};
 use crate::comm::words::{holder, share, sum};
 use crate::comm::{Comm, all_gather_u64};
 
@@ -61,6 +63,8 @@ struct Share {
     points: Vec<[f64; 3]>,
     ids: Option<Vec<i64>>,
     cells: Vec<Cell>,
+    /// Of results of this program.
+    named: Option<own::Named>,
 }
 
 /// Kind, group and places of points.
@@ -77,17 +81,43 @@ struct Cell {
 pub(super) fn read(comm: &dyn Comm, path: &Path) -> Result<Msh, Problem> {
     let told = |text| Problem::Told { text, is_unreadable: false };
     let mine = Share::read(comm, path);
-    let Share { nodes, points, ids, mut cells } = agree(comm, "the VTKHDF file", mine).map_err(told)?;
+    let Share { nodes, points, ids, mut cells, named } = agree(comm, "the VTKHDF file", mine).map_err(told)?;
     cells.retain(|cell| cell.kind.dimension >= 2);
     let first = share(nodes, comm).start;
+    let mut names = Vec::new();
     if let Some(ids) = ids {
+        let faces = named.map(|(known, faces)| {
+            names = known.groups();
+            of_surfaces(comm, first, &ids, faces)
+        });
         let one = canonical(comm, first, &ids);
         let asked: Vec<[u64; 1]> = cells.iter().flat_map(|cell| &cell.nodes).map(|&node| [node]).collect();
         let of = |[node]: &[u64; 1]| one[(node - first) as usize];
         let places = ask(comm, &asked, |[node]| holder(*node, nodes, comm), |_| of);
         cells.iter_mut().flat_map(|cell| &mut cell.nodes).zip(places).for_each(|(node, place)| *node = place);
+        cells.extend(agree(comm, "the faces of surfaces", faces.unwrap_or(Ok(Vec::new()))).map_err(told)?);
     }
-    Ok(dealt(comm, Msh { nodes, points, ..Msh::default() }, &cells))
+    Ok(dealt(comm, Msh { nodes, points, names, ..Msh::default() }, &cells))
+}
+
+/// Faces of surfaces as cells, from the numbers of nodes; `ids` are those of this rank's points, from `first`. Collective.
+fn of_surfaces(comm: &dyn Comm, first: u64, ids: &[i64], faces: Vec<(i64, Vec<u64>)>) -> Result<Vec<Cell>, String> {
+    let known = ids.iter().zip(first..).map(|(id, at)| ([id.cast_unsigned()], vec![at]));
+    let places = look_up(comm, known, faces.iter().flat_map(|(_, nodes)| nodes).map(|&node| [node]));
+    let kind_of = |nodes: usize| {
+        Kind::of(match nodes {
+            3 => 2,
+            4 => 3,
+            _ => 9,
+        })
+    };
+    let cell = |(surface, nodes): (i64, Vec<u64>)| {
+        let kind = kind_of(nodes.len())?;
+        let nodes = nodes.iter().map(|&node| places.get(&[node]).map(|place| place[0])).collect::<Option<_>>()?;
+        Some(Cell { kind, group: surface as i32 + 1, nodes })
+    };
+    let cells: Option<Vec<Cell>> = faces.into_iter().map(cell).collect();
+    cells.ok_or_else(|| "a face of its surfaces has a node that is not there".to_owned())
 }
 
 impl Share {
@@ -95,7 +125,8 @@ impl Share {
         let text = |error: hdf5_metno::Error| error.to_string();
         let file = File::open(path).map_err(text)?;
         let root = file.group("VTKHDF").map_err(|_| "it has no group VTKHDF".to_owned())?;
-        if root.link_exists("Steps") {
+        let named = own::read(comm, &file)?;
+        if root.link_exists("Steps") && named.is_none() {
             return Err("it has time steps: save one of them".to_owned());
         }
         let pieces = pieces(&root).map_err(text)??;
@@ -109,18 +140,23 @@ impl Share {
         if let Some(at) = points.iter().position(|point| point.iter().any(|x| !x.is_finite())) {
             return Err(format!("point {} is nowhere: its coordinates are not finite", own.start + at as u64));
         }
-        let known = root.link_exists("PointData") && root.link_exists("PointData/GlobalPointIds");
-        let ids = known.then(|| rows(&root, "PointData/GlobalPointIds", &own, 1)).transpose().map_err(text)?;
+        let numbers = if named.is_some() { "PointData/node" } else { "PointData/GlobalPointIds" };
+        let known = root.link_exists("PointData") && root.link_exists(numbers);
+        if named.is_some() && !known {
+            return Err(format!("it has names of surfaces, and no {numbers} that say where they are"));
+        }
+        let ids = known.then(|| rows(&root, numbers, &own, 1)).transpose().map_err(text)?;
+        let names = named.as_ref().map(|(names, _)| names);
         let mut found = Vec::new();
         let own = share(cells, comm);
         for (number, piece) in pieces.iter().enumerate() {
             let begin = own.start.clamp(piece.cells.start, piece.cells.end);
             let end = own.end.clamp(piece.cells.start, piece.cells.end);
             if begin < end {
-                found.extend(of_piece(&root, (number as u64, piece), begin..end).map_err(text)??);
+                found.extend(of_piece(&root, (number as u64, piece), begin..end, names).map_err(text)??);
             }
         }
-        Ok(Self { nodes, points, ids, cells: found })
+        Ok(Self { nodes, points, ids, cells: found, named })
     }
 }
 
@@ -155,6 +191,7 @@ fn of_piece(
     root: &Group,
     (number, piece): (u64, &Piece),
     cells: Range<u64>,
+    names: Option<&Names>,
 ) -> hdf5_metno::Result<Result<Vec<Cell>, String>> {
     let types: Vec<u8> = rows(root, "Types", &cells, 1)?;
     // Each piece before has one offset more than cells.
@@ -165,11 +202,9 @@ fn of_piece(
     }
     let [first, last] = [0, offsets.len() - 1].map(|k| piece.connectivity + offsets[k] as u64);
     let connectivity: Vec<i64> = rows(root, "Connectivity", &(first..last), 1)?;
-    let name =
-        GROUPS.into_iter().find(|name| root.link_exists("CellData") && root.link_exists(&format!("CellData/{name}")));
-    let groups: Vec<i32> = match name {
-        Some(name) => rows(root, &format!("CellData/{name}"), &cells, 1)?,
-        None => vec![ONLY; types.len()],
+    let groups = match groups(root, &cells, names)? {
+        Some(groups) => groups,
+        None => return Ok(Err(format!("a cell of piece {number} is of no body that it names"))),
     };
     let points = piece.points.end - piece.points.start;
     let mut found = Vec::new();
@@ -187,6 +222,21 @@ fn of_piece(
         found.push(Cell { kind, group, nodes: (0..kind.nodes).map(place).collect() });
     }
     Ok(Ok(found))
+}
+
+/// The group of each of some cells; none if one has a body without a name.
+fn groups(root: &Group, cells: &Range<u64>, names: Option<&Names>) -> hdf5_metno::Result<Option<Vec<i32>>> {
+    if let Some(names) = names {
+        let [bodies, materials]: [Vec<i64>; 2] =
+            [rows(root, "CellData/body", cells, 1)?, rows(root, "CellData/material", cells, 1)?];
+        return Ok(bodies.into_iter().zip(materials).map(|of| names.volume(of)).collect());
+    }
+    let name =
+        GROUPS.into_iter().find(|name| root.link_exists("CellData") && root.link_exists(&format!("CellData/{name}")));
+    Ok(Some(match name {
+        Some(name) => rows(root, &format!("CellData/{name}"), cells, 1)?,
+        None => vec![ONLY; (cells.end - cells.start) as usize],
+    }))
 }
 
 /// Rows of an array, `width` numbers each.

@@ -94,3 +94,51 @@ fn contact_may_hold_a_body() {
     assert!(warnings[0].contains("body upper"), "{warnings:?}");
     assert!(warnings[0].contains("1 rigid motion that only contact can hold: translation along z"), "{warnings:?}");
 }
+
+/// Every form of a number, as texts and as tables, through a scene and back.
+#[test]
+fn numbers_whose_error_is_asked_for_are_read_in_both_forms() {
+    let read = |value: &str| two_blocks(&["solver.error=0.01", &format!("solver.error_of={value}")]);
+    for (text, table) in [
+        ("displacement:1,2.5,3:-z", "{displacement={point=[1.0, 2.5, 3.0], direction=[0.0, 0.0, -2.0]}}"),
+        (
+            "displacement:1,2.5,3:3,0,4:upper",
+            "{displacement={point=[1.0, 2.5, 3.0], direction=[0.6, 0.0, 0.8], body='upper'}}",
+        ),
+        ("reaction:left:x", "{reaction={support='left', direction='x'}}"),
+        ("contact_force", "{contact_force={}}"),
+        ("contact_force:joint", "{contact_force={contact='joint'}}"),
+        ("contact_force:joint:0,0,1", "{contact_force={contact='joint', direction='z'}}"),
+    ] {
+        let scene = read(text).unwrap();
+        assert_eq!(scene, read(table).unwrap(), "{text}");
+        assert_eq!(Scene::from_text(&scene.to_toml(), "echo", 1, &[]).unwrap(), scene, "{}", scene.to_toml());
+        assert!(scene.solver.error_of.goal().is_some());
+    }
+    let of_stress = read("stress").unwrap();
+    assert_eq!(Scene::from_text(&of_stress.to_toml(), "echo", 1, &[]).unwrap(), of_stress);
+}
+
+#[test]
+fn numbers_that_a_scene_does_not_have_are_refused() {
+    let refuses = |value: &str, words: &[&str]| {
+        assert_says(two_blocks(&["solver.error=0.01", &format!("solver.error_of={value}")]), words);
+    };
+    refuses("heat", &["`heat`", "displacement:X,Y,Z:DIRECTION"]);
+    refuses("displacement:1,2:z", &["`1,2` is no point"]);
+    refuses("displacement:1,2,3:w", &["`w` is no direction"]);
+    refuses("displacement:1,2,3:0,0,0", &["is no direction"]);
+    refuses("displacement:1,2,nan:z", &["solver.error_of", "finite"]);
+    refuses("displacement:1,2,3", &["write energy, stress"]);
+    refuses("displacement:1,2,3:z:middle", &["no such body: known are lower, upper"]);
+    refuses("reaction", &["several: name one of left, right"]);
+    refuses("reaction:bottom", &["no such support: known are left, right"]);
+    refuses("reaction:left", &["fixes several components", "reaction:left:z"]);
+    refuses("contact_force:bolt", &["no such contact: known are joint"]);
+    refuses("{reaction={support='left', along='x'}}", &["unknown key `along`"]);
+    let roll = "support.roll={surface='block.xmin', fix=['x']}";
+    let one = |value: &str| one(&["solver.error=0.01", roll, &format!("solver.error_of={value}")]);
+    assert!(one("reaction:roll").is_ok() && one("reaction:base:1,2,3").is_ok());
+    assert_says(one("reaction:roll:z"), &["support.roll does not fix z"]);
+    assert_says(one("contact_force"), &["the scene has no contact"]);
+}

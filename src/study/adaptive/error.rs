@@ -14,8 +14,20 @@
 //! are those of its last increment, which begins from another state on each mesh: there `theta` stays so.
 //!
 //! Of the stress: the estimate of `estimate`, by `SAFETY` larger.
+//!
+//! Of a number `Q`: what elements add to it has both signs. The sum `E` of it (`estimate::weighted`) is near the error where it is
+//! smooth and too small at edges and fronts; that of its sizes, `D`, falls from mesh to mesh as the error does, but for what cancels.
+//! So the error is taken to be the larger one of
+//!
+//! ```text
+//! SAFETY_OF_SUM |E|   and   theta D,   theta = |Q_1 - Q_2| / (D_1 - D_2)
+//! ```
+//!
+//! with the largest `theta` of the last three meshes as above, at least `LEAST_OF_NUMBER`. Measured over the error, from the second mesh
+//! that tells: 0.8 to 17, most of them 1 to 3. Where curved surfaces of meshes that do not match touch, conditions have an error
+//! that is in neither; there it was 0.4 to 1.
 
-use crate::record::rows::RefinementRow;
+use crate::record::rows::{GoalRow, RefinementRow};
 use crate::scene::ErrorOf;
 
 /// Estimated over true errors of the stress are 0.87 and more on refined meshes.
@@ -29,10 +41,20 @@ const LEAST: f64 = 0.5;
 /// Where nothing tells it.
 const UNKNOWN: f64 = 1.5;
 
+/// Errors of numbers were up to 1.8 times what elements add up to on meshes that resolve the solution.
+const SAFETY_OF_SUM: f64 = 1.5;
+/// See [`LEAST`]; of the sizes of elements, 0.3 to 1 was left where little cancels.
+const LEAST_OF_NUMBER: f64 = 0.3;
+/// See [`UNKNOWN`]: nothing cancels.
+const UNKNOWN_OF_NUMBER: f64 = 1.0;
+/// A number is nothing if it is below this share of the terms that it is a sum of.
+const NOTHING: f64 = 1e-8;
+
 /// The relative error on the last mesh, from the rows of all; its own `error` is not looked at.
-pub fn estimate(of: ErrorOf, meshes: &[RefinementRow]) -> f64 {
+pub fn estimate(of: &ErrorOf, meshes: &[RefinementRow]) -> f64 {
     let Some(last) = meshes.last() else { return f64::INFINITY };
     match of {
+        ErrorOf::Goal(_) => of_goal(meshes),
         ErrorOf::Stress => SAFETY * last.stress,
         ErrorOf::Energy => {
             let (theta, least) = if is_history(meshes) { (UNKNOWN, 0.0) } else { (factor(meshes), rise(meshes)) };
@@ -40,6 +62,41 @@ pub fn estimate(of: ErrorOf, meshes: &[RefinementRow]) -> f64 {
             if above == 0.0 { 0.0 } else { above / last.size }
         }
     }
+}
+
+/// The error of a number, see the header.
+fn of_goal(meshes: &[RefinementRow]) -> f64 {
+    let Some(last) = meshes.last().and_then(|row| row.goal) else { return f64::INFINITY };
+    if vanishes(&last) {
+        return f64::INFINITY;
+    }
+    let before = meshes.iter().rev().skip(1).filter_map(|row| row.goal);
+    let tells = |coarse: &GoalRow| coarse.distance > 0.0 && coarse.distance >= APART * last.distance;
+    let theta = |coarse: GoalRow| (coarse.value - last.value).abs() / (coarse.distance - last.distance);
+    let told = before.filter(tells).take(3).map(theta);
+    let theta = told.reduce(f64::max).unwrap_or(UNKNOWN_OF_NUMBER).max(LEAST_OF_NUMBER);
+    (theta * last.distance).max(SAFETY_OF_SUM * last.correction.abs()) / last.value.abs()
+}
+
+/// Whether an error is more than a guess: those of energies are when meshes were compared, those of numbers when the second mesh
+/// changed them to the side that elements add up to, or there is a third.
+pub fn is_known(of: &ErrorOf, meshes: &[RefinementRow]) -> bool {
+    match (of, meshes) {
+        (ErrorOf::Stress, _) => true,
+        (ErrorOf::Energy, _) => meshes.len() > 1 || is_history(meshes),
+        (ErrorOf::Goal(_), [one, other]) => {
+            let side = |(one, other): (GoalRow, GoalRow)| {
+                (other.value - one.value) * (one.correction - other.correction) >= 0.0
+            };
+            one.goal.zip(other.goal).is_some_and(side)
+        }
+        (ErrorOf::Goal(_), _) => meshes.len() > 2,
+    }
+}
+
+/// Whether a number is nothing but rounding, so that no error can be relative to it.
+pub fn vanishes(goal: &GoalRow) -> bool {
+    goal.value.abs() <= NOTHING * goal.terms
 }
 
 /// Whether a mesh took more than one increment of a history: energies are of steps from different states then.
@@ -82,26 +139,57 @@ mod tests {
         let limit = |work: f64| Some(LimitLoad { lower: 1.0, upper: 1.0, factor: 1.0, work });
         let row = |energy, distance, work| RefinementRow { limit_load: limit(work), ..known(energy, distance) };
         let [coarse, other, fine] = [row(9.0, 4.0, 1.0), row(100.0, 8.0, 2.0), row(8.0, 1.0, 1.0)];
-        let alone = estimate(ErrorOf::Energy, &[coarse.clone(), fine.clone()]);
-        assert_eq!(estimate(ErrorOf::Energy, &[other.clone(), coarse, fine.clone()]), alone);
-        assert_eq!(estimate(ErrorOf::Energy, &[other, fine]), UNKNOWN * 1.0 / 8.0);
+        let alone = estimate(&ErrorOf::Energy, &[coarse.clone(), fine.clone()]);
+        assert_eq!(estimate(&ErrorOf::Energy, &[other.clone(), coarse, fine.clone()]), alone);
+        assert_eq!(estimate(&ErrorOf::Energy, &[other, fine]), UNKNOWN * 1.0 / 8.0);
     }
 
     #[test]
     fn a_constant_factor_is_found_from_two_meshes() {
         let meshes: Vec<RefinementRow> = (0..4).map(|k| 0.5_f64.powi(k)).map(|e| known(-10.0 + e, 2.0 * e)).collect();
-        let error = |count: usize| estimate(ErrorOf::Energy, &meshes[..count]);
+        let error = |count: usize| estimate(&ErrorOf::Energy, &meshes[..count]);
         assert_eq!(error(1), UNKNOWN * 2.0 / 9.0);
         for count in 2..=4 {
             let exact = 0.5_f64.powi(count as i32 - 1);
             assert!((error(count) * meshes[count - 1].energy.abs() - exact).abs() < 1e-12);
         }
-        assert!((estimate(ErrorOf::Stress, &meshes) - 0.12).abs() < 1e-15);
+        assert!((estimate(&ErrorOf::Stress, &meshes) - 0.12).abs() < 1e-15);
+    }
+
+    fn of_number(value: f64, correction: f64, distance: f64) -> RefinementRow {
+        let goal = Some(GoalRow { value, correction, distance, terms: value.abs(), ..GoalRow::default() });
+        RefinementRow { goal, ..RefinementRow::default() }
+    }
+
+    #[test]
+    fn errors_of_numbers_follow_from_what_meshes_changed_or_elements_add_up_to() {
+        let of = ErrorOf::Goal("contact_force".parse::<ErrorOf>().unwrap().goal().unwrap().clone());
+        let error = |meshes: &[RefinementRow]| estimate(&of, meshes);
+        assert_eq!(error(&[of_number(-8.0, 0.1, 2.0)]), 2.0 / 8.0);
+        // Half of the sizes is left: 1 of 2 from the first mesh to the second.
+        let meshes = [of_number(-8.0, 0.1, 4.0), of_number(-9.0, -0.1, 2.0), of_number(-9.5, 0.1, 1.0)];
+        assert_eq!(error(&meshes), 0.5 / 9.5);
+        // Little changed, by chance: the sum of the elements, and the least share of the sizes.
+        assert_eq!(error(&[of_number(8.0, 1.0, 4.0), of_number(8.0, -1.0, 2.0)]), 1.5 / 8.0);
+        assert_eq!(error(&[of_number(8.0, 1.0, 4.0), of_number(8.0, 0.0, 2.0)]), 0.6 / 8.0);
+        // Exact in any case: forces that balance loads.
+        assert_eq!(error(&[of_number(8.0, 0.0, 0.0)]), 0.0);
+        let nothing = RefinementRow {
+            goal: Some(GoalRow { value: 1e-9, terms: 1.0, ..GoalRow::default() }),
+            ..meshes[0].clone()
+        };
+        assert_eq!(error(&[nothing]), f64::INFINITY);
+        assert_eq!(error(&[RefinementRow::default()]), f64::INFINITY);
+
+        assert!(!is_known(&of, &meshes[..1]) && is_known(&of, &meshes));
+        assert!(!is_known(&of, &[of_number(8.0, 2.0, 4.0), of_number(7.0, 1.0, 1.0)]));
+        assert!(is_known(&of, &[of_number(8.0, 2.0, 4.0), of_number(9.0, 1.0, 1.0)]));
+        assert!(is_known(&ErrorOf::Energy, &meshes) && !is_known(&ErrorOf::Energy, &meshes[..1]));
     }
 
     #[test]
     fn meshes_that_tell_nothing_are_left_out() {
-        let error = |meshes: &[RefinementRow]| estimate(ErrorOf::Energy, meshes);
+        let error = |meshes: &[RefinementRow]| estimate(&ErrorOf::Energy, meshes);
         // The first mesh saw less than there was.
         assert_eq!(error(&[known(-5.0, 1.0), known(-8.0, 2.0)]), UNKNOWN * 2.0 / 8.0);
         assert_eq!(error(&[known(-5.0, 1.0), known(-8.0, 2.0), known(-9.0, 1.0)]), 1.0 / 9.0);

@@ -131,10 +131,11 @@ impl Adaptive {
 }
 
 /// What each element of each of this rank's subdomains has of the error: an energy, or a square; the largest of all increments.
-pub fn parts(discrete: &Discrete, solved: &Solved, of: ErrorOf) -> Vec<Vec<f64>> {
+pub fn parts(discrete: &Discrete, solved: &Solved, of: &ErrorOf) -> Vec<Vec<f64>> {
     let largest = |name| fields::largest(&solved.piece, &discrete.decomposition.subdomains, name);
     match of {
         ErrorOf::Energy => largest(fields::ENERGY_ERROR),
+        ErrorOf::Goal(_) => largest(fields::GOAL_ERROR),
         ErrorOf::Stress => {
             let squares = |parts: Vec<f64>| parts.into_iter().map(|part| part * part).collect();
             largest(fields::STRESS_ERROR).into_iter().map(squares).collect()
