@@ -7,7 +7,7 @@ use super::contact::Side;
 use super::links::{Linked, components};
 use super::prescribed::Prescribed;
 use super::ties::Ties;
-use super::{Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, gluing};
+use super::{Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, friction, gluing};
 use crate::contact::known::Pairs;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
@@ -19,13 +19,14 @@ struct Cluster {
 
 impl Constraints {
     /// All rows that touch this rank's subdomains. Supports agree (see [`dirichlet::check`]). Of parallel contact conditions that
-    /// gives the row which is the tightest at the time `at`.
+    /// gives the row which is the tightest at the time `at`. `friction` tells which contacts have any.
     pub fn new(
         decomposition: &Decomposition,
         supports: &[Support],
         pairs: &Pairs,
         linked: Linked,
         at: &Prescribed,
+        friction: &[bool],
     ) -> Self {
         let Linked { nodes: tied, ties, stiffness } = linked;
         let clusters = clusters(pairs, &ties);
@@ -41,6 +42,7 @@ impl Constraints {
         };
         let mut result = Self {
             rows: Vec::new(),
+            sliders: Vec::new(),
             blocks: Vec::new(),
             block_subdomains: Vec::new(),
             slot_begin: vec![0],
@@ -48,10 +50,12 @@ impl Constraints {
             entries: vec![Vec::new(); decomposition.subdomains.len()],
             copies: local_copies(decomposition),
             has_inequalities: pairs.total() > 0,
+            has_friction: friction.contains(&true),
             uneven: stiffness.least * JUMP <= stiffness.largest,
             ties,
             idle: Vec::new(),
         };
+        let mut directions = Vec::new();
         for (subdomains, key) in by_subdomains(keys, nodes) {
             let mut rows = Vec::new();
             let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
@@ -64,15 +68,21 @@ impl Constraints {
             let mut contacts: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
             for &number in clusters.get(&key).iter().flat_map(|cluster| &cluster.pairs) {
                 let pair = &pairs[number];
-                match contact::row(number, pair, |node| sides[&node]) {
+                match contact::row(number, pair, &|node| sides[&node]) {
                     Ok(row) => contact::add_tightest(contacts.entry(pair.slave).or_default(), row, at),
                     Err(held) => result.idle.push((number, held)),
                 }
             }
-            rows.extend(contacts.into_values().flatten());
             rows.iter_mut().for_each(|row| row.weigh(young, stiffness.largest));
+            for mut of_node in contacts.into_values() {
+                of_node.iter_mut().for_each(|row| row.weigh(young, stiffness.largest));
+                let (more, along) = friction_rows(&of_node, pairs, &|node| sides[&node], friction);
+                directions.extend(along);
+                rows.extend(of_node.into_iter().chain(more));
+            }
             result.push_block(rows, subdomains, decomposition);
         }
+        result.find_sliders(pairs, directions);
         result
     }
 
@@ -113,6 +123,33 @@ impl Constraints {
         let rows = self.rows.iter().zip(change).zip(lambda).filter(|((row, _), _)| of(row.kind));
         rows.for_each(|((row, change), l)| *l += change / (row.length * row.length));
     }
+}
+
+/// The friction rows beside the contact rows of one node, and their directions. They are as long as those.
+fn friction_rows<'a>(
+    contacts: &[Row],
+    pairs: &Pairs,
+    sides: &impl Fn(u64) -> Side<'a>,
+    friction: &[bool],
+) -> (Vec<Row>, Vec<[f64; 3]>) {
+    let of = |row: &Row| match row.kind {
+        Kind::Contact { pair } => pair,
+        _ => unreachable!("contact rows are of pairs"),
+    };
+    let mut taken: Vec<[f64; 3]> = contacts.iter().map(|row| pairs[of(row)].normal).collect();
+    let mut found = Vec::new();
+    for contact in contacts.iter().filter(|row| friction[pairs[of(row)].contact]) {
+        let number = of(contact);
+        for (mut row, direction) in friction::rows(number, &pairs[number], sides, &taken) {
+            row.lengthen(contact.length);
+            // Nodes with one condition have both directions.
+            if contacts.len() > 1 {
+                taken.push(direction);
+            }
+            found.push((row, direction));
+        }
+    }
+    found.into_iter().unzip()
 }
 
 /// The conditions of each connected component of nodes, and its nodes, by its lowest node.

@@ -26,13 +26,26 @@ pub(super) fn nodes(pair: &ContactPair) -> impl Iterator<Item = (u64, f64)> {
 ///
 /// # Errors
 /// If supports fix all nodes along the normal: what they fix.
-pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> Side<'a>) -> Result<Row, Vec<Fixed>> {
+pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: &impl Fn(u64) -> Side<'a>) -> Result<Row, Vec<Fixed>> {
+    row_along(pair.normal, Kind::Contact { pair: number }, pair, sides)
+}
+
+/// The row of a pair along a unit `direction`; see [`row`].
+///
+/// # Errors
+/// If supports fix all nodes along it: what they fix.
+pub(super) fn row_along<'a>(
+    direction: [f64; 3],
+    kind: Kind,
+    pair: &ContactPair,
+    sides: &impl Fn(u64) -> Side<'a>,
+) -> Result<Row, Vec<Fixed>> {
     let (mut terms, mut fixed) = (Vec::new(), Vec::new());
     let mut square = 0.0;
     for (node, factor) in nodes(pair) {
         let (node, supports) = sides(node);
         let weight = factor / node.copies.len() as f64;
-        for (axis, (component, support)) in pair.normal.into_iter().zip(supports).enumerate() {
+        for (axis, (component, support)) in direction.into_iter().zip(supports).enumerate() {
             match support {
                 Some(support) => fixed.push(Fixed { support, axis, weight: factor * component }),
                 None if component == 0.0 => {}
@@ -44,13 +57,13 @@ pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: impl Fn(u64) -> 
             }
         }
     }
-    // What is left of the normal is round-off: the direction is fixed.
+    // What is left of it is round-off: the direction is fixed.
     if square < 1e-16 {
         return Err(fixed);
     }
     let scale = 1.0 / square.sqrt();
     terms.iter_mut().for_each(|term| term.value *= scale);
-    Ok(Row { kind: Kind::Contact { pair: number }, scale, length: 1.0, terms, fixed, parallel: Vec::new() })
+    Ok(Row { kind, scale, length: 1.0, terms, fixed, parallel: Vec::new() })
 }
 
 /// Adds the row of a pair to those of the same slave node. Of parallel ones that stays which is the tightest at this time, and

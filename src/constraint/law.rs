@@ -5,8 +5,12 @@
 //!
 //! ```text
 //! equality      (gluing, support)         Lambda = R           s = 0
-//! unilateral    (contact, no friction)    Lambda = [0, inf)    s >= 0,   lambda s = 0
+//! unilateral    (contact)                 Lambda = [0, inf)    s >= 0,   lambda s = 0
+//! friction      (two rows of a pair)      Lambda = a disc      -s = 0 inside, along lambda on its border
 //! ```
+//!
+//! The radius of the disc is the limit of the stress times the area (Tresca), or the coefficient times the multiplier of the
+//! pair's contact row (Coulomb).
 //!
 //! (Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008), section 2.) A row is *kept* where its multiplier may
 //! act: always if it is an equality, where it is closed if it is a contact.
@@ -14,11 +18,12 @@
 //! This is the only file that knows the sign of a contact's multiplier. Multipliers and slacks are those of the rows, or
 //! both in physical units: the scale of a row is positive and changes no answer.
 //!
-//! [`Law`] answers for one row, [`Laws`] for all rows of a rank. A law speaks of the rows of one node in one contact.
-//! Without friction that is one row, the normal one. A disc or a cone of tangential multipliers is a law of several rows;
-//! [`Laws`] is where rows become groups, and those who ask it for whole vectors do not see the difference.
+//! [`Law`] answers for one row, [`Laws`] for all rows of a rank: it knows which rows are of one disc, and its radius. Those who
+//! ask it for whole vectors do not see the difference.
 
+use super::friction::Slider;
 use super::{Constraints, Kind, Row};
+use crate::scene::Friction;
 
 /// Which multipliers a row admits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +32,8 @@ pub enum Law {
     Equality,
     /// Multipliers that are not negative: surfaces push and do not pull.
     Unilateral,
+    /// One of the multipliers in a disc: the row is of friction. Alone it admits any.
+    Friction,
 }
 
 /// Whether surfaces touch. The numbers are those of the field `contact_status` in result files.
@@ -34,8 +41,10 @@ pub enum Law {
 pub enum Status {
     /// No force.
     Open = 0,
-    /// A force.
+    /// A force. With friction: and no slip.
     Closed = 1,
+    /// A force, and slip.
+    Slip = 2,
 }
 
 impl Status {
@@ -51,10 +60,15 @@ impl Law {
         self == Self::Equality
     }
 
+    /// Whether it is the condition of a contact, which opens and closes.
+    pub fn opens(self) -> bool {
+        self == Self::Unilateral
+    }
+
     /// Whether a row of this multiplier is kept. Multipliers up to `rounding` are none.
     pub fn is_kept(self, lambda: f64, rounding: f64) -> bool {
         match self {
-            Self::Equality => true,
+            Self::Equality | Self::Friction => true,
             Self::Unilateral => lambda > rounding,
         }
     }
@@ -62,7 +76,7 @@ impl Law {
     /// Whether a row of this slack is kept. Slacks up to `rounding` are none.
     pub fn is_kept_at(self, slack: f64, rounding: f64) -> bool {
         match self {
-            Self::Equality => true,
+            Self::Equality | Self::Friction => true,
             Self::Unilateral => slack <= rounding,
         }
     }
@@ -75,7 +89,7 @@ impl Law {
     /// The admissible multiplier next to this one.
     pub fn project(self, lambda: f64) -> f64 {
         match self {
-            Self::Equality => lambda,
+            Self::Equality | Self::Friction => lambda,
             Self::Unilateral => lambda.max(0.0),
         }
     }
@@ -83,7 +97,7 @@ impl Law {
     /// Distance of a multiplier from the admissible ones.
     pub fn distance(self, lambda: f64) -> f64 {
         match self {
-            Self::Equality => 0.0,
+            Self::Equality | Self::Friction => 0.0,
             Self::Unilateral => (-lambda).max(0.0),
         }
     }
@@ -91,23 +105,24 @@ impl Law {
     /// Lower bound of `lambda - start`; minus infinity if there is none.
     pub fn lower_bound(self, start: f64) -> f64 {
         match self {
-            Self::Equality => f64::NEG_INFINITY,
+            Self::Equality | Self::Friction => f64::NEG_INFINITY,
             Self::Unilateral => -start,
         }
     }
 
-    /// The part of the slack that violates the row: all of an equality's, a contact's penetration (negative).
+    /// The part of the slack that violates the row: all of an equality's, a contact's penetration (negative); surfaces may slide.
     pub fn violation(self, slack: f64) -> f64 {
         match self {
             Self::Equality => slack,
             Self::Unilateral => slack.min(0.0),
+            Self::Friction => 0.0,
         }
     }
 
     /// Whether the row resists a motion that changes `B u` by `moved`. Changes up to `rounding` are none.
     pub fn resists(self, moved: f64, rounding: f64) -> bool {
         match self {
-            Self::Equality => moved.abs() > rounding,
+            Self::Equality | Self::Friction => moved.abs() > rounding,
             Self::Unilateral => moved > rounding,
         }
     }
@@ -119,14 +134,25 @@ impl Row {
         match self.kind {
             Kind::Gluing | Kind::Support { .. } => Law::Equality,
             Kind::Contact { .. } => Law::Unilateral,
+            Kind::Friction { .. } => Law::Friction,
         }
     }
 }
 
 impl Constraints {
-    /// The laws of all rows of this rank.
-    pub fn laws(&self) -> Laws<'_> {
-        Laws { rows: &self.rows }
+    /// The laws of all rows of this rank, under these laws of friction of the scene's contacts.
+    pub fn laws<'a>(&'a self, friction: &'a [Option<Friction>]) -> Laws<'a> {
+        Laws { rows: &self.rows, sliders: &self.sliders, friction }
+    }
+
+    /// Leaves of slacks what violates the rows.
+    pub fn violation(&self, slack: &mut [f64]) {
+        self.rows.iter().zip(slack).for_each(|(row, slack)| *slack = row.law().violation(*slack));
+    }
+
+    /// Rows that come and go with their multipliers.
+    pub fn may_open(&self) -> Vec<bool> {
+        self.rows.iter().map(|row| row.law().opens()).collect()
     }
 }
 
@@ -134,49 +160,91 @@ impl Constraints {
 #[derive(Clone, Copy)]
 pub struct Laws<'a> {
     rows: &'a [Row],
+    sliders: &'a [Slider],
+    friction: &'a [Option<Friction>],
 }
 
-impl Laws<'_> {
-    /// Rows that come and go with their multipliers.
-    pub fn may_open(self) -> Vec<bool> {
-        self.rows.iter().map(|row| !row.law().always_holds()).collect()
+impl<'a> Laws<'a> {
+    /// The largest multiplier of a slider's friction rows, where that of its contact row is `normal`.
+    pub fn radius(self, slider: &Slider, normal: f64) -> f64 {
+        let scale = self.rows[slider.tangents[0].row].scale;
+        match self.friction[slider.contact] {
+            None => 0.0,
+            Some(Friction::Tresca(limit)) => limit * slider.share / scale,
+            Some(Friction::Coulomb(coefficient)) => {
+                coefficient * self.rows[slider.normal].scale * Law::Unilateral.project(normal) / scale
+            }
+        }
     }
 
-    /// Rows that are kept at these multipliers. Multipliers up to `rounding` are none.
+    /// The sliders, each with its radius as that of the contact row's multiplier has it: constant, and factor.
+    pub fn radii(self) -> impl Iterator<Item = (&'a Slider, [f64; 2])> {
+        self.sliders.iter().map(move |slider| {
+            let constant = self.radius(slider, 0.0);
+            (slider, [constant, self.radius(slider, 1.0) - constant])
+        })
+    }
+
+    /// Rows that are kept at these multipliers. Multipliers up to `rounding` are none. Friction acts where there is any.
     pub fn kept(self, lambda: &[f64], rounding: f64) -> Vec<bool> {
-        self.rows.iter().zip(lambda).map(|(row, &lambda)| row.law().is_kept(lambda, rounding)).collect()
+        self.with_friction(self.rows.iter().zip(lambda).map(|(row, &lambda)| row.law().is_kept(lambda, rounding)))
     }
 
     /// Rows that are kept at these slacks. Slacks up to `rounding` are none.
     pub fn kept_at(self, slack: &[f64], rounding: f64) -> Vec<bool> {
-        self.rows.iter().zip(slack).map(|(row, &slack)| row.law().is_kept_at(slack, rounding)).collect()
+        self.with_friction(self.rows.iter().zip(slack).map(|(row, &slack)| row.law().is_kept_at(slack, rounding)))
     }
 
-    /// Makes multipliers admissible, each the next one.
+    /// Friction rows are kept where something presses, or where that does not matter.
+    fn with_friction(self, kept: impl Iterator<Item = bool>) -> Vec<bool> {
+        let mut kept: Vec<bool> = kept.collect();
+        for (slider, [constant, factor]) in self.radii() {
+            let acts = constant > 0.0 || (factor > 0.0 && kept[slider.normal]);
+            slider.tangents.iter().for_each(|tangent| kept[tangent.row] = acts);
+        }
+        kept
+    }
+
+    /// Makes multipliers admissible, each the next one; those of a contact row first.
     pub fn project(self, lambda: &mut [f64]) {
-        self.rows.iter().zip(lambda).for_each(|(row, lambda)| *lambda = row.law().project(*lambda));
+        self.rows.iter().zip(&mut *lambda).for_each(|(row, lambda)| *lambda = row.law().project(*lambda));
+        self.project_discs(lambda);
     }
 
     /// Makes multipliers admissible where rows are kept, and zero elsewhere.
     pub fn project_onto(self, kept: &[bool], lambda: &mut [f64]) {
-        for ((row, lambda), &kept) in self.rows.iter().zip(lambda).zip(kept) {
+        for ((row, lambda), &kept) in self.rows.iter().zip(&mut *lambda).zip(kept) {
             *lambda = if kept { row.law().project(*lambda) } else { 0.0 };
+        }
+        self.project_discs(lambda);
+    }
+
+    fn project_discs(self, lambda: &mut [f64]) {
+        for slider in self.sliders {
+            let (size, radius) = (slider.size(lambda), self.radius(slider, lambda[slider.normal]));
+            if size > radius {
+                slider.tangents.iter().for_each(|tangent| lambda[tangent.row] *= radius / size);
+            }
         }
     }
 
     /// The largest distance of a multiplier from the admissible ones, on this rank.
     pub fn distance(self, lambda: &[f64]) -> f64 {
-        self.rows.iter().zip(lambda).fold(0.0, |most, (row, &lambda)| most.max(row.law().distance(lambda)))
+        let rows = self.rows.iter().zip(lambda).map(|(row, &lambda)| row.law().distance(lambda));
+        let beyond = |slider: &Slider| slider.size(lambda) - self.radius(slider, lambda[slider.normal]);
+        rows.chain(self.sliders.iter().map(beyond)).fold(0.0, f64::max)
     }
 
     /// Lower bounds of `lambda - start`, minus infinity where there is none.
     pub fn lower_bounds(self, start: &[f64]) -> Vec<f64> {
         self.rows.iter().zip(start).map(|(row, &start)| row.law().lower_bound(start)).collect()
     }
+}
 
-    /// Leaves of slacks what violates the rows.
-    pub fn violation(self, slack: &mut [f64]) {
-        self.rows.iter().zip(slack).for_each(|(row, slack)| *slack = row.law().violation(*slack));
+impl Slider {
+    /// Length of the vector that friction rows have of values of the rows.
+    pub fn size(&self, rows: &[f64]) -> f64 {
+        self.tangents.iter().map(|tangent| rows[tangent.row] * rows[tangent.row]).sum::<f64>().sqrt()
     }
 }
 
@@ -256,8 +324,17 @@ mod tests {
         };
         let asking: BTreeSet<String> =
             sources().into_iter().filter(|(_, code)| asks(code)).map(|(name, _)| name).collect();
-        let solvers = ["src/constraint/mod.rs", "src/qp/feasible.rs", "src/qp/active_set.rs", "src/newton/damping.rs"]
-            .map(str::to_owned);
+        let solvers = [
+            "src/constraint/mod.rs",
+            "src/constraint/friction.rs",
+            "src/constraint/blocks.rs",
+            "src/qp/feasible.rs",
+            "src/qp/active_set.rs",
+            "src/newton/damping.rs",
+            "src/newton/friction.rs",
+            "src/study/contact.rs",
+        ]
+        .map(str::to_owned);
         let expected: BTreeSet<String> = asking.into_iter().chain(solvers).collect();
         assert_eq!(listed(), expected, "left: CONTRIBUTING.md, right: the sources");
     }

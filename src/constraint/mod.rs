@@ -18,6 +18,7 @@ pub mod blocks;
 pub mod components;
 pub mod contact;
 pub mod dirichlet;
+pub mod friction;
 pub mod gluing;
 pub mod law;
 pub mod links;
@@ -28,6 +29,7 @@ use std::ops::Range;
 
 use thiserror::Error;
 
+use self::friction::Slider;
 use self::prescribed::Parallel;
 use self::ties::Ties;
 
@@ -47,6 +49,13 @@ pub enum Kind {
     Contact {
         /// Number of the contact pair among those of the scene.
         pair: usize,
+    },
+    /// What two surfaces slide along each other.
+    Friction {
+        /// Number of the contact pair.
+        pair: usize,
+        /// Number of the direction, 0 or 1.
+        axis: u8,
     },
 }
 
@@ -94,7 +103,7 @@ pub struct Fixed {
 impl Kind {
     /// Whether the row is of a contact: its force is one that surfaces exert on each other.
     pub fn is_contact(self) -> bool {
-        matches!(self, Self::Contact { .. })
+        matches!(self, Self::Contact { .. } | Self::Friction { .. })
     }
 }
 
@@ -118,11 +127,16 @@ impl Row {
         let flexibility: f64 = self.terms.iter().map(|t| t.value * t.value / stiffness(t.subdomain)).sum();
         let relative = (1.0 / (flexibility * largest)).max(SOFTEST);
         if relative * JUMP <= 1.0 {
-            self.length = (0.5 * relative.log2()).round().exp2();
-            self.scale *= self.length;
-            self.parallel.iter_mut().for_each(|other| other.scale *= self.length);
-            self.terms.iter_mut().for_each(|term| term.value *= self.length);
+            self.lengthen((0.5 * relative.log2()).round().exp2());
         }
+    }
+
+    /// Multiplies its length by a factor.
+    fn lengthen(&mut self, factor: f64) {
+        self.length *= factor;
+        self.scale *= factor;
+        self.parallel.iter_mut().for_each(|other| other.scale *= factor);
+        self.terms.iter_mut().for_each(|term| term.value *= factor);
     }
 }
 
@@ -156,6 +170,8 @@ pub struct Entry {
 pub struct Constraints {
     /// Rows, block by block in the order of the blocks' lowest nodes. Terms are sorted by subdomain and node: one slot each.
     pub rows: Vec<Row>,
+    /// Friction at the contact pairs of these rows; none without friction.
+    pub sliders: Vec<Slider>,
     /// Rows of each block.
     pub blocks: Vec<Range<usize>>,
     /// Subdomains of each block, ascending.
@@ -170,6 +186,8 @@ pub struct Constraints {
     pub copies: Vec<Vec<(u32, u32)>>,
     /// Whether any rank has contact rows.
     pub has_inequalities: bool,
+    /// Whether any contact has friction, in any step.
+    pub has_friction: bool,
     /// Whether stiffness jumps, and rows may be of unequal length.
     pub uneven: bool,
     /// Nodes that short edges tie together.

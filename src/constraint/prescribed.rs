@@ -2,7 +2,7 @@
 //!
 //! A support row's is `sqrt(m) d` with the prescribed displacement `d` at a node of `m` copies. A contact row's is what
 //! is left of the gap `g` where supports move nodes of the condition, `scale (g - sum of weight d)`. Both are as long as the
-//! row (see [`Row::length`]). A gluing row's is zero.
+//! row (see [`Row::length`]). A friction row's is what supports and obstacles slide by themselves. A gluing row's is zero.
 
 use std::collections::HashMap;
 
@@ -15,13 +15,20 @@ pub struct Prescribed {
     pub displacements: Vec<[f64; 3]>,
     /// Gap of each contact pair that is known here, by its number, along its normal (length); the motion of an obstacle is part of it.
     pub gaps: HashMap<usize, f64>,
+    /// How far the obstacle of each contact pair with friction is moved (length).
+    pub drags: HashMap<usize, [f64; 3]>,
 }
 
 impl Prescribed {
     /// What is left of a pair's gap where supports fix components of its condition (length).
     pub(super) fn distance(&self, pair: usize, fixed: &[Fixed]) -> f64 {
+        self.left(self.gaps[&pair], fixed)
+    }
+
+    /// What is left of a distance where supports fix components of a condition (length).
+    fn left(&self, distance: f64, fixed: &[Fixed]) -> f64 {
         let left = |left: f64, h: &Fixed| left - h.weight * self.displacements[h.support][h.axis];
-        fixed.iter().fold(self.gaps[&pair], left)
+        fixed.iter().fold(distance, left)
     }
 }
 
@@ -49,6 +56,7 @@ impl Row {
                 let others = self.parallel.iter().map(|p| p.scale * at.distance(p.pair, &p.fixed));
                 others.fold(own, |tightest, other| if other < tightest { other } else { tightest })
             }
+            Kind::Friction { .. } => self.scale * at.left(0.0, &self.fixed),
         }
     }
 }
@@ -56,7 +64,9 @@ impl Row {
 impl Constraints {
     /// Right-hand sides of all rows.
     pub fn right_hand_sides(&self, at: &Prescribed) -> Vec<f64> {
-        self.rows.iter().map(|row| row.right_hand_side(at)).collect()
+        let mut rhs: Vec<f64> = self.rows.iter().map(|row| row.right_hand_side(at)).collect();
+        self.add_drags(at, &mut rhs);
+        rhs
     }
 
     /// Contact pairs of own nodes without a row, and the distance that supports leave them (length).

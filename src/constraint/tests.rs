@@ -14,9 +14,10 @@ use crate::fixture::{
 use crate::scene::Scene;
 
 /// Contact of subdomains that do not match, nodes with eight copies, compact parts.
-fn scenes() -> [Scene; 4] {
+fn scenes() -> [Scene; 5] {
     [
         two_bricks(&[]),
+        two_bricks(&["contact.joint.friction=0.3"]),
         two_bricks_by_metis(9),
         built_in("patch", &[]),
         built_in("patch", &["decomposition.subdomains=12"]),
@@ -96,17 +97,22 @@ fn a_common_motion_leaves_gluing_at_rest_and_is_seen_by_supports_and_contact() {
             let u: Vec<f64> = setup.subdomains().iter().flat_map(motions).collect();
             let bu = setup.dense_rows() * column(&u);
             let size = u.iter().fold(0.0_f64, |size, u| size.max(u.abs()));
-            for (found, row) in bu.col(0).iter().zip(setup.rows()) {
+            let along = |number: usize, pair: usize| {
+                let tangents = setup.discrete.constraints.sliders.iter().flat_map(|slider| &slider.tangents);
+                let tangent = tangents.into_iter().find(|tangent| tangent.row == number);
+                tangent.map_or(setup.discrete.contacts.pairs[pair].normal, |tangent| tangent.direction)
+            };
+            for (number, (found, row)) in bu.col(0).iter().zip(setup.rows()).enumerate() {
                 let expected = match row.kind {
                     Kind::Gluing => 0.0,
                     Kind::Support { axis, .. } => {
                         (row.terms.len() as f64).sqrt() * motion(point(setup, row.terms[0].node))[axis]
                     }
-                    Kind::Contact { pair } => {
-                        let pair = &setup.discrete.contacts.pairs[pair];
+                    Kind::Contact { pair } | Kind::Friction { pair, .. } => {
+                        let (along, pair) = (along(number, pair), &setup.discrete.contacts.pairs[pair]);
                         let part = |node: u64, axis: usize| {
                             let free = row.terms.iter().any(|t| (t.node, t.axis) == (node, axis));
-                            if free { pair.normal[axis] * motion(point(setup, node))[axis] } else { 0.0 }
+                            if free { along[axis] * motion(point(setup, node))[axis] } else { 0.0 }
                         };
                         let sides = |a: usize| contact::nodes(pair).map(|(node, w)| w * part(node, a)).sum::<f64>();
                         row.scale * (0..3).map(sides).sum::<f64>()
@@ -151,7 +157,7 @@ fn supports_in_conflict_are_refused_on_every_rank_with_one_message() {
             supports.push(Support { name, displacement: [0.0, 0.1, 0.5], ..twin.clone() });
             let interface = &setup.discrete.decomposition.interface;
             let displacements = supports.iter().map(|support| support.displacement).collect();
-            let at = Prescribed { displacements, gaps: HashMap::new() };
+            let at = Prescribed { displacements, gaps: HashMap::new(), drags: HashMap::new() };
             dirichlet::check(setup.comm, interface, &supports, &at).err()
         });
         let expected = ConstraintError::Conflict {
@@ -183,7 +189,18 @@ fn node(node: u64, copies: &[u32]) -> InterfaceNode {
 
 fn pair(slaves: &[(u64, f64)], masters: &[(u64, f64)]) -> ContactPair {
     let (slaves, masters, normal) = (slaves.to_vec(), masters.to_vec(), [0.6, 0.0, 0.8]);
-    ContactPair { contact: 0, slave: 7, part: 0, slaves, masters, normal, gap: 0.5, area: 1.0, covered: true }
+    ContactPair {
+        contact: 0,
+        slave: 7,
+        part: 0,
+        slaves,
+        masters,
+        normal,
+        gap: 0.5,
+        area: 1.0,
+        share: 1.0,
+        covered: true,
+    }
 }
 
 /// Sum of a row's coefficients at a node, as before it was made a unit vector.
@@ -196,9 +213,10 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
     let pair = pair(&[(7, 1.0), (6, 0.5)], &[(8, 0.75), (9, 0.75)]);
     let nodes = [node(6, &[3]), node(7, &[0, 3]), node(8, &[1, 2, 4]), node(9, &[2])];
     let (held, free) = ([Some(0), None, None], [None; 3]);
-    let at = Prescribed { displacements: vec![[0.25, 0.0, 0.0]], gaps: HashMap::from([(3, 0.5)]) };
+    let at =
+        Prescribed { displacements: vec![[0.25, 0.0, 0.0]], gaps: HashMap::from([(3, 0.5)]), drags: HashMap::new() };
     let side = |number: u64, fixed: [Option<usize>; 3]| (&nodes[number as usize - 6], fixed);
-    let row = contact::row(3, &pair, |n| side(n, if n % 2 == 1 { held } else { free })).expect("much is free");
+    let row = contact::row(3, &pair, &|n| side(n, if n % 2 == 1 { held } else { free })).expect("much is free");
     let square: f64 = row.terms.iter().map(|t| t.value * t.value).sum();
     assert!((square - 1.0).abs() < 1e-15);
     assert!((row.right_hand_side(&at) - row.scale * (0.5 - 0.6 * 0.25 + 0.75 * 0.6 * 0.25)).abs() < 1e-15);
@@ -215,7 +233,7 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
             assert!((coefficient(&row, node, axis) - expected).abs() < 1e-15, "{node} {axis}");
         }
     }
-    let all = contact::row(3, &pair, |n| side(n, [Some(0); 3])).unwrap_err();
+    let all = contact::row(3, &pair, &|n| side(n, [Some(0); 3])).unwrap_err();
     let left = Prescribed { displacements: vec![[0.1; 3]], ..at }.distance(3, &all);
     assert!((left - 0.5).abs() < 1e-15, "a common motion leaves the gap: {left}");
 }
@@ -224,10 +242,14 @@ fn a_contact_row_takes_means_of_copies_and_moves_what_supports_fix_to_its_right_
 fn of_contacts_in_one_direction_the_tightest_counts() {
     let slave = node(7, &[0, 3]);
     const GAPS: [f64; 5] = [0.5, -0.5, 0.2, 0.3, 0.1];
-    let at = |gaps: [f64; 5]| Prescribed { displacements: Vec::new(), gaps: gaps.into_iter().enumerate().collect() };
+    let at = |gaps: [f64; 5]| Prescribed {
+        displacements: Vec::new(),
+        gaps: gaps.into_iter().enumerate().collect(),
+        drags: HashMap::new(),
+    };
     let row = |number: usize, normal: [f64; 3]| {
         let pair = ContactPair { normal, ..pair(&[(7, 1.0)], &[]) };
-        contact::row(number, &pair, |_| (&slave, [None; 3])).expect("it is free")
+        contact::row(number, &pair, &|_| (&slave, [None; 3])).expect("it is free")
     };
     let (up, down) = ([0.6, 0.0, 0.8], [-0.6, 0.0, -0.8]);
     let mut rows = Vec::new();

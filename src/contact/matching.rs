@@ -36,7 +36,7 @@ pub fn facing(one: &GatheredSurface, other: &GatheredSurface) -> Option<Facing> 
 
 /// Conditions of contact number `contact` on the nodes of own faces.
 pub fn conditions(contact: usize, slave: &GatheredSurface, master: &GatheredSurface, facing: Facing) -> Conditions {
-    let normals: Vec<[f64; 3]> = slave.normals_and_areas().into_iter().map(|(normal, _)| normal).collect();
+    let (normals, shares): (Vec<[f64; 3]>, Vec<f64>) = slave.normals_and_areas().into_iter().unzip();
     let areas = slave.covered_areas(&normals, |node| facing[node].is_some());
     let mut found = Conditions::default();
     for (k, (opposite, area)) in facing.into_iter().zip(areas).enumerate() {
@@ -54,6 +54,7 @@ pub fn conditions(contact: usize, slave: &GatheredSurface, master: &GatheredSurf
             normal: normals[k],
             gap,
             area,
+            share: shares[k],
             covered: true,
         });
     }

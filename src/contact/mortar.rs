@@ -106,6 +106,7 @@ pub fn conditions(
             masters: masters.into_iter().map(|(l, sum)| (l, sum / whole)).collect(),
             normal,
             area,
+            share: normals[node].1,
             covered: reach[node] >= AT_THE_EDGE,
         }
     };

@@ -42,7 +42,7 @@ pub fn pair(
     let pairs = own.filter_map(|(_, (((&slave, &point), (outward, area)), &part))| {
         let (normal, gap) = approach(obstacle, point, outward)?;
         let (slaves, masters) = (vec![(slave, 1.0)], Vec::new());
-        let pair = ContactPair { contact, slave, part, slaves, masters, normal, gap, area, covered: true };
+        let pair = ContactPair { contact, slave, part, slaves, masters, normal, gap, area, share: area, covered: true };
         (dot(normal, outward) > FACING).then_some(pair)
     });
     let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);
@@ -50,7 +50,9 @@ pub fn pair(
     // What is left of several parts of a node is one condition if it says the same.
     pairs.dedup_by(|next, first| {
         let same = (next.slave, next.normal, &next.slaves) == (first.slave, first.normal, &first.slaves);
-        first.area += if same { next.area } else { 0.0 };
+        if same {
+            (first.area, first.share) = (first.area + next.area, first.share + next.share);
+        }
         same
     });
     let tells = |pair: &&ContactPair| surface.index(pair.slave, pair.part).is_some_and(|index| surface.tells(index));

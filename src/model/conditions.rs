@@ -46,7 +46,8 @@ pub(super) fn constraints(
     let steps = scene.steps();
     let at = given.prescribed(scene, Some(&steps[0]));
     agreed(&at)?;
-    let constraints = Constraints::new(decomposition, supports, &contacts.pairs, linked, &at);
+    let laws: Vec<bool> = scene.contact.iter().map(|(name, contact)| contact.rubs(name, steps)).collect();
+    let constraints = Constraints::new(decomposition, supports, &contacts.pairs, linked, &at, &laws);
     refuse_held(comm, given, &constraints.idle_distances(&at))?;
     let first = constraints.right_hand_sides(&at);
 
@@ -86,9 +87,14 @@ impl Given<'_> {
             let (displacement, factor) = obstacles[pair.contact];
             pair.gap + dot(pair.normal, displacement) * factor
         };
+        let drag = |(number, pair): (usize, &ContactPair)| {
+            let (displacement, factor) = obstacles[pair.contact];
+            (displacement != [0.0; 3]).then(|| (number, displacement.map(|d| factor * d)))
+        };
         Prescribed {
             displacements: self.supports.iter().map(of_support).collect(),
             gaps: self.contacts.pairs.iter().map(|(number, pair)| (number, gap(pair))).collect(),
+            drags: self.contacts.pairs.iter().filter_map(drag).collect(),
         }
     }
 }

@@ -28,6 +28,8 @@ pub struct Contacts {
     pub sharing: Vec<usize>,
     /// How each contact was paired.
     pub rows: Vec<ContactRow>,
+    /// Whether any has friction, in any step.
+    pub has_friction: bool,
 }
 
 /// What contacts are made of.
@@ -53,6 +55,7 @@ pub(super) fn pair(
     let &Given { scene, decomposition, supports, nodes, .. } = given;
     let mut all = Contacts {
         names: scene.contact.keys().cloned().collect(),
+        has_friction: scene.contact.iter().any(|(name, contact)| contact.rubs(name, scene.steps())),
         surfaces: scene.contact.values().flat_map(Contact::surfaces).map(&index).collect(),
         ..Contacts::default()
     };

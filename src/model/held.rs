@@ -35,7 +35,8 @@ pub fn at_all_stages(
 ) -> Result<(), ModelError> {
     let subdomains = &discrete.decomposition.subdomains;
     let resultants = |stage: usize| recover::resultants(subdomains, modes, coarse, &stages[stage].end.loads);
-    equilibrium::check(coarse, space, &discrete.constraints, stages.len(), resultants)
+    let friction = |stage: usize| stages[stage].end.friction.clone();
+    equilibrium::check(coarse, space, &discrete.constraints, stages.len(), (resultants, friction))
         .map_err(|unheld| ModelError::Unheld(refusal(scene, &unheld)))?;
     Ok(coarse.factorise()?)
 }

@@ -5,7 +5,7 @@ use super::conditions::RightHandSides;
 use super::discrete::Discrete;
 use crate::assembly::loads::{self, Load};
 use crate::feti::Torn;
-use crate::scene::Scene;
+use crate::scene::{Friction, Scene, Step};
 
 /// What is prescribed at one time.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +14,8 @@ pub struct Conditions {
     pub loads: Torn,
     /// `c`: right-hand sides of this rank's rows.
     pub rhs: Vec<f64>,
+    /// Law of friction of each contact of the scene.
+    pub friction: Vec<Option<Friction>>,
 }
 
 /// A straight part of the history: a load step of the scene.
@@ -27,7 +29,7 @@ pub struct Stage {
 }
 
 impl Conditions {
-    /// A fraction of the way from here to `end`; exactly `end` at 1.
+    /// A fraction of the way from here to `end`; exactly `end` at 1. Friction is that of the end.
     pub fn towards(&self, end: &Self, fraction: f64) -> Self {
         if fraction == 1.0 {
             return end.clone();
@@ -36,6 +38,7 @@ impl Conditions {
         Self {
             loads: self.loads.iter().zip(&end.loads).map(|(a, b)| between(a, b)).collect(),
             rhs: between(&self.rhs, &end.rhs),
+            friction: end.friction.clone(),
         }
     }
 }
@@ -44,11 +47,20 @@ impl Conditions {
 pub fn stages(scene: &Scene, discrete: &Discrete, zeros: &dyn Fn() -> Torn) -> (Conditions, Vec<Stage>) {
     let RightHandSides { begin, ends } = &discrete.right_hand_sides;
     let stages = scene.steps().iter().zip(ends).map(|(step, rhs)| Stage {
-        end: Conditions { loads: loads(scene, discrete, zeros, &|name| step.of_load(name)), rhs: rhs.clone() },
+        end: Conditions {
+            loads: loads(scene, discrete, zeros, &|name| step.of_load(name)),
+            rhs: rhs.clone(),
+            friction: friction(scene, step),
+        },
         increments: step.increments,
         halvings: step.halvings,
     });
-    (Conditions { loads: zeros(), rhs: begin.clone() }, stages.collect())
+    (Conditions { loads: zeros(), rhs: begin.clone(), friction: friction(scene, &scene.steps()[0]) }, stages.collect())
+}
+
+/// Laws of friction during a step.
+fn friction(scene: &Scene, step: &Step) -> Vec<Option<Friction>> {
+    scene.contact.iter().map(|(name, contact)| step.friction(name, contact)).collect()
 }
 
 /// The loads that grow to their limit, if the scene asks for it.
@@ -74,7 +86,7 @@ mod tests {
 
     #[test]
     fn conditions_move_in_straight_lines_and_arrive_exactly() {
-        let at = |x: f64| Conditions { loads: vec![vec![x, 0.1], vec![3.0 * x]], rhs: vec![-x] };
+        let at = |x: f64| Conditions { loads: vec![vec![x, 0.1], vec![3.0 * x]], rhs: vec![-x], friction: Vec::new() };
         let end = at(0.3);
         assert_eq!(at(0.1).towards(&end, 1.0), end);
         let middle = at(0.1).towards(&end, 0.5);

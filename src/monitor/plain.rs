@@ -210,6 +210,7 @@ fn residual_lines(residuals: &Residuals) -> Vec<String> {
         ("gluing", residuals.gluing),
         ("gap", residuals.gap),
         ("complementarity", residuals.complementarity),
+        ("friction", residuals.friction.filter(|friction| *friction != 0.0)),
         ("balance", residuals.balance),
     ];
     let known = rows.into_iter().filter_map(|(name, value)| value.map(|v| format!("  {name:<16}{v:>12.3e}")));

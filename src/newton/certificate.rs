@@ -23,6 +23,10 @@
 //! the first value is that already. Each turn costs one `K^+` and no conjugate gradients; there are four at most, and the least
 //! value counts.
 //!
+//! With friction `J` has the term `sum r |s|` and the gap `sum (r |s| - lambda_t's)`, which is not negative where `|lambda_t| <= r`
+//! ([`super::friction`]). Under Coulomb's law that is the bound for the program with the radii `r` of the multipliers; whether these are
+//! the right ones the residual of friction tells.
+//!
 //! The gap bounds the error of the stress without a constant, and that of the displacement with one:
 //!
 //! ```text
@@ -137,8 +141,10 @@ impl StepSolver<'_> {
             timer.time("certificate", || self.operator.solve(&mut torn));
             self.operator.add_bonds([&mut lambda]);
         }
-        // lambda_I'(c - B u)_I.
-        let open = problem.space.dots(&[(&problem.of_contact(&lambda), &problem.slack(u))])[0].max(0.0);
+        // lambda_I'(c - B u)_I, and what friction dissipates.
+        let slack = problem.slack(u);
+        let open = problem.space.dots(&[(&problem.of_contact(&lambda), &slack)])[0];
+        let open = (open + problem.dissipation(&problem.radii(&lambda), &slack)).max(0.0);
 
         let mut trial = Trial::at(problem, (u, state), &lambda);
         let mut best = Certificate { gap: f64::INFINITY, is_bound: balanced, solves: 0 };
@@ -171,7 +177,7 @@ impl StepSolver<'_> {
     fn equilibrate(&self, problem: &TornProblem, lambda: &[f64]) -> (Vec<f64>, bool) {
         let coarse = &self.coarse;
         let wanted = recover::resultants(problem.subdomains, problem.modes, coarse, &problem.loads);
-        let laws = problem.constraints.laws();
+        let laws = problem.laws();
         let largest = |mine: f64| problem.space.maximum(mine);
         let mut lambda = lambda.to_vec();
         for _ in 0..BALANCINGS {

@@ -11,6 +11,7 @@ impl TornProblem<'_> {
     pub fn commit(&mut self, u: &Torn, state: &State, lambda: &[f64]) {
         let sizes = Sizes { elastic_norm: self.elastic_norm(u), ..self.measure(u, state, lambda).1 };
         self.committed.sizes = self.committed.sizes.larger(sizes);
+        self.commit_slips(&self.slack(u));
         self.committed.histories.resize_with(u.len(), Vec::new);
         for own in (0..u.len()).filter(|&own| state.yielding[own] > 0) {
             self.committed.histories[own] = internal::commit(&self.region(own), &u[own]);

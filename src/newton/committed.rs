@@ -9,6 +9,8 @@ use crate::material::History;
 pub struct Committed {
     /// History of each integration point of each own subdomain; none where nothing ever yielded.
     pub histories: Vec<Vec<History>>,
+    /// What surfaces have slid, in friction rows; zero in other rows, empty without friction.
+    pub slips: Vec<f64>,
     /// Least sizes that relative errors refer to.
     pub sizes: Sizes,
 }

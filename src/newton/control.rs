@@ -134,7 +134,7 @@ impl Control {
         let change = (work - before - added) / compliance;
         add(change, &v, &mut step.du);
         step.lambda.iter_mut().zip(&lambda).for_each(|(l, of_v)| *l += change * of_v);
-        problem.constraints.laws().project(&mut step.lambda);
+        problem.laws().project(&mut step.lambda);
         self.change(problem, change, before, state);
         step.is_exact = false;
         Ok(())

@@ -1,8 +1,10 @@
 //! Step length along the Newton direction by the energy `J`.
 //!
 //! The full step is taken where it lowers `J` enough. Otherwise the slope of the convex function `J(u + t du)` is
-//! brought near zero by regula falsi (Illinois variant), which the convexity makes safe.
+//! brought near zero by regula falsi (Illinois variant), which the convexity makes safe. With friction that is `J` and what friction
+//! dissipates, with the radii of the new multipliers ([`super::friction`]).
 
+use super::friction::Radii;
 use super::problem::{State, TornProblem};
 use crate::feti::Torn;
 use crate::monitor::timing::Timer;
@@ -16,6 +18,32 @@ const ROUNDING: f64 = 1e-15;
 /// Evaluations of `J` before the direction is given up.
 const TRIALS: usize = 30;
 
+/// What is minimised: `J`, and what friction with these radii dissipates.
+struct Cost<'p, 'a> {
+    problem: &'p TornProblem<'a>,
+    radii: &'p Radii,
+}
+
+impl Cost<'_, '_> {
+    fn of(&self, u: &Torn, state: &State) -> f64 {
+        if !self.problem.constraints.has_friction {
+            return state.energy;
+        }
+        state.energy + self.problem.dissipation(self.radii, &self.problem.slack(u))
+    }
+
+    /// Its slope at `u` along `du`.
+    fn slope(&self, u: &Torn, state: &State, du: &Torn) -> f64 {
+        let slope = self.problem.slope(state, du);
+        if !self.problem.constraints.has_friction {
+            return slope;
+        }
+        let mut change = vec![0.0; self.problem.gather.rows()];
+        self.problem.gather.apply(du, &mut change);
+        slope + self.problem.dissipation_slope(self.radii, &self.problem.slack(u), &change)
+    }
+}
+
 /// The accepted step.
 pub struct Damped {
     /// The new displacement, admissible.
@@ -26,16 +54,16 @@ pub struct Damped {
     pub length: f64,
 }
 
-/// Searches from `u` along `du`. `None` if no length lowers the energy. Where `u` is not `admissible` the energies
+/// Searches from `u` along `du`, with these radii of friction. `None` if no length lowers the energy. Where `u` is not `admissible` the energies
 /// cannot be compared and the full step is taken.
 pub fn search(
     problem: &TornProblem,
-    u: &Torn,
-    state: &State,
-    du: &Torn,
+    (u, state): (&Torn, &State),
+    (du, radii): (&Torn, &Radii),
     admissible: bool,
     timer: &Timer,
 ) -> Option<Damped> {
+    let cost = Cost { problem, radii };
     let trial = |length: f64| {
         timer.time("internal forces", || {
             let mut v = u.clone();
@@ -51,24 +79,24 @@ pub fn search(
     if !admissible {
         return Some(full);
     }
-    let first_slope = problem.slope(state, du);
+    let (first_slope, before) = (cost.slope(u, state, du), cost.of(u, state));
     // Round-off in the difference of two energies.
     let cancelled = ROUNDING * full.state.terms.energy.sqrt();
     let noise = 1e-12
         * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs())
         + cancelled * (cancelled + 2.0 * state.internal_energy.abs().sqrt());
-    let lowers = |t: &Damped| t.state.energy <= state.energy + SUFFICIENT * t.length * first_slope.min(0.0) + noise;
+    let lowers = |t: &Damped| cost.of(&t.u, &t.state) <= before + SUFFICIENT * t.length * first_slope.min(0.0) + noise;
     if lowers(&full) {
         return Some(full);
     }
     // Illinois: the slope changes its sign between low and high, (length, slope) each.
     let mut low = (0.0, first_slope);
-    let mut high = (1.0, problem.slope(&full.state, du));
+    let mut high = (1.0, cost.slope(&full.u, &full.state, du));
     for _ in 0..TRIALS {
         let inside = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
         let length = if inside > low.0 && inside < high.0 { inside } else { 0.5 * (low.0 + high.0) };
         let next = trial(length);
-        let slope = problem.slope(&next.state, du);
+        let slope = cost.slope(&next.u, &next.state, du);
         if lowers(&next) && slope.abs() <= FLAT * first_slope.abs() {
             return Some(next);
         }

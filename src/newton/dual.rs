@@ -2,16 +2,19 @@
 //! rows ([`WholeDual`]) or on those of an active set ([`DualFace`]).
 
 use crate::constraint::Constraints;
+use crate::constraint::law::Law;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::motion;
 use crate::feti::coarse::projector::Projector;
+use crate::feti::coarse::sliding::{Across, Sliding};
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::preconditioner::Preconditioner;
 use crate::monitor::timing::Timer;
 use crate::qp::active_set::Face;
 use crate::qp::quadratic::{Quadratic, Space};
+use crate::qp::slides::Slides;
 
 /// Inner products of multipliers.
 pub struct Multipliers<'a>(pub &'a RowSpace<'a>, pub &'a Timer);
@@ -123,6 +126,13 @@ pub struct DualFace<'s, 'a> {
     pub resultants: &'s [f64],
     /// The rows of the set.
     pub rows: CoarseFace,
+    /// What discs of friction do.
+    pub slides: Slides,
+}
+
+/// The friction rows of which slips leave one combination free.
+pub fn sliding(slides: &Slides) -> Sliding {
+    Sliding::new(slides.across().map(|(rows, direction)| Across { rows, direction }).collect())
 }
 
 /// A contact resists a motion if this changes `B u` there by more than this share of the largest change in any row.
@@ -133,27 +143,54 @@ impl DualFace<'_, '_> {
     /// it. False if none resists.
     pub fn complete(&mut self, kept: &mut [bool]) -> bool {
         let size = self.resultants.iter().map(|e| e * e).sum::<f64>().sqrt();
-        while let Some(motion) = self.rows.unbalanced(self.resultants, size) {
+        let left = self.left();
+        while let Some(motion) = self.rows.unbalanced(&left, size) {
             let moved = self.dual.coarse.moved(&motion);
             let most = self.dual.space.maximum(moved.iter().fold(0.0, |most, m| most.max(m.abs())));
             let mut joined = 0.0;
             for ((kept, row), &moved) in kept.iter_mut().zip(&self.constraints.rows).zip(&moved) {
-                if !*kept && row.law().resists(moved, RESISTS * most) {
+                if !*kept && row.law() != Law::Friction && row.law().resists(moved, RESISTS * most) {
                     (*kept, joined) = (true, 1.0);
+                }
+            }
+            if self.dual.space.maximum(joined) == 0.0 {
+                // What presses may stick.
+                for slider in &self.constraints.sliders {
+                    if !kept[slider.normal] {
+                        continue;
+                    }
+                    for row in slider.tangents.iter().map(|tangent| tangent.row) {
+                        if !kept[row] && Law::Friction.resists(moved[row], RESISTS * most) {
+                            (kept[row], joined) = (true, 1.0);
+                        }
+                    }
                 }
             }
             if self.dual.space.maximum(joined) == 0.0 {
                 return false;
             }
-            self.rows = self.rows.with(self.dual.coarse, self.dual.space, kept.to_vec());
+            let sliding = self.rows.slides().clone();
+            self.rows = self.rows.with(self.dual.coarse, self.dual.space, kept.to_vec(), sliding);
         }
         true
+    }
+
+    /// What friction along slips leaves of `e`. Collective.
+    fn left(&self) -> Vec<f64> {
+        let mut left = self.resultants.to_vec();
+        if !self.constraints.has_friction {
+            return left;
+        }
+        let taken = self.dual.coarse.apply(&self.slides.fixed(self.constraints.rows.len()));
+        left.iter_mut().zip(taken).for_each(|(e, taken)| *e -= taken);
+        left
     }
 }
 
 impl Quadratic for DualFace<'_, '_> {
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.dual.apply(x, y);
+        self.slides.add_compliance(1.0, x, y);
     }
 
     fn project(&mut self, x: &mut [f64]) {
@@ -178,23 +215,35 @@ impl Quadratic for DualFace<'_, '_> {
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
-        self.dual.precondition(r, z)
+        if self.slides.is_empty() {
+            return self.dual.precondition(r, z);
+        }
+        let mut soft = r.to_vec();
+        self.slides.soften(&mut soft);
+        let is_there = self.dual.precondition(&soft, z);
+        if is_there {
+            self.rows.mask(z);
+            self.slides.soften(z);
+            self.slides.add_springs(r, z);
+        }
+        is_there
     }
 }
 
 impl Face for DualFace<'_, '_> {
-    fn restrict(&mut self, kept: &mut [bool]) -> bool {
+    fn restrict(&mut self, kept: &mut [bool], slides: &Slides) -> bool {
         let timer = self.dual.timer;
         let Dual { coarse, space, .. } = self.dual;
-        self.rows = timer.time("coarse set-up", || self.rows.with(coarse, space, kept.to_vec()));
+        self.slides.clone_from(slides);
+        self.rows = timer.time("coarse set-up", || self.rows.with(coarse, space, kept.to_vec(), sliding(slides)));
         let complete = timer.time("coarse set-up", || self.complete(kept));
         self.dual.restrict_scaling(self.constraints, kept);
+        self.slides.adopt(kept);
         complete
     }
 
     fn restore(&mut self, x: &mut [f64]) {
         self.dual.timer.time("coarse problem", || {
-            self.rows.mask(x);
             let present = self.dual.coarse.apply(x);
             let missing = self.resultants.iter().zip(present).map(|(e, b)| e - b).collect();
             self.rows.add_balance(self.dual.coarse, missing, x);
@@ -203,7 +252,7 @@ impl Face for DualFace<'_, '_> {
 
     fn gaps(&mut self, residual: &mut [f64]) {
         self.dual.timer.time("coarse problem", || {
-            let a = motion::amplitudes(&self.rows, self.dual.coarse, self.dual.space, residual);
+            let a = motion::amplitudes(&self.rows, self.dual.coarse, self.dual.space, self.constraints, residual);
             self.dual.coarse.add_transpose(-1.0, &a, residual);
         });
     }

@@ -92,7 +92,11 @@ impl<'a> Newton<'a> {
         begin: Begin,
         timer: &Timer,
     ) -> Self {
-        let path = Path { begin: Conditions { loads: take(&mut problem.loads), rhs: take(&mut problem.rhs) }, stages };
+        let friction = take(&mut problem.friction);
+        let path = Path {
+            begin: Conditions { loads: take(&mut problem.loads), rhs: take(&mut problem.rhs), friction },
+            stages,
+        };
         let rest = |problem: &TornProblem| (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
         let (mut attempt, mut forcing) = (Attempt::FIRST, Forcing::default());
         let (mut reached, mut steps, mut before, mut stood, mut reach) = (None, Vec::new(), 0, None, None);
@@ -110,7 +114,7 @@ impl<'a> Newton<'a> {
                 ((snapshot.u, snapshot.lambda), snapshot.kept)
             }
         };
-        Conditions { loads: problem.loads, rhs: problem.rhs } = path.conditions(attempt);
+        Conditions { loads: problem.loads, rhs: problem.rhs, friction: problem.friction } = path.conditions(attempt);
         let control = along.map(|along| Control::new(&problem.loads, along, reach));
         if let Some(control) = &control {
             (problem.loads, problem.firm) = (control.loads(), firm(&problem.materials));
@@ -264,7 +268,8 @@ impl<'a> Newton<'a> {
             return Trial::Ended(outcome);
         }
         // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
-        match damping::search(problem, &iterate.u, &iterate.state, &step.du, self.admissible, timer) {
+        let radii = problem.radii(&step.lambda);
+        match damping::search(problem, (&iterate.u, &iterate.state), (&step.du, &radii), self.admissible, timer) {
             Some(damped) => Trial::Accepted(step, damped),
             None if !iterate.state.energy.is_finite() => Trial::Ended(Outcome::NotFinite),
             None if refused.len() >= TRIALS => Trial::Ended(Outcome::Stalled),
@@ -347,10 +352,10 @@ impl<'a> Newton<'a> {
     /// Begins with an attempt, near the last increment that was reached.
     fn enter(&mut self, attempt: Attempt, timer: &Timer) {
         let Self { problem, solver, path, .. } = self;
-        Conditions { loads: problem.loads, rhs: problem.rhs } = path.conditions(attempt);
+        Conditions { loads: problem.loads, rhs: problem.rhs, friction: problem.friction } = path.conditions(attempt);
         let lambda = vec![0.0; problem.gather.rows()];
         let (u, kept) = match &self.reached {
-            Some(reached) => (reached.u.clone(), Some(problem.constraints.laws().kept(&reached.lambda, 0.0))),
+            Some(reached) => (reached.u.clone(), Some(problem.laws().kept(&reached.lambda, 0.0))),
             None => (problem.gather.zeros(), None),
         };
         let (iterate, outcome) = first_iterate(problem, solver, (u, lambda), kept, None, timer);

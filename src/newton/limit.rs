@@ -79,7 +79,7 @@ impl Newton<'_> {
 
     /// Begins the iteration for another work; contacts press where these multipliers say so.
     fn begin(&mut self, u: Torn, lambda: Option<&[f64]>, timer: &Timer) {
-        let kept = lambda.map(|lambda| self.problem.constraints.laws().kept(lambda, 0.0));
+        let kept = lambda.map(|lambda| self.problem.laws().kept(lambda, 0.0));
         let rest = vec![0.0; self.problem.gather.rows()];
         let (iterate, outcome) = first_iterate(&self.problem, &mut self.solver, (u, rest), kept, None, timer);
         (self.iterate, self.outcome, self.admissible) = (iterate, outcome, true);

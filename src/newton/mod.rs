@@ -18,6 +18,7 @@ pub mod damping;
 pub mod dual;
 pub mod errors;
 pub mod forcing;
+pub mod friction;
 pub mod iteration;
 pub mod limit;
 pub mod outcome;

@@ -7,6 +7,7 @@ use super::committed::Committed;
 use crate::assembly::Region;
 use crate::assembly::internal::{self, Terms};
 use crate::constraint::Constraints;
+use crate::constraint::law::Laws;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
@@ -15,9 +16,10 @@ use crate::feti::dual::coupling::Coupling;
 use crate::feti::dual::gather::Gather;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::RigidModes;
-use crate::material::{Law, Material};
+use crate::material::{Law as _, Material};
 use crate::model::Discrete;
 use crate::model::history::Conditions;
+use crate::scene::Friction;
 use crate::work;
 
 /// What one rank holds of the problem.
@@ -48,6 +50,8 @@ pub struct TornProblem<'a> {
     pub sums: &'a NodeSums<'a>,
     /// Whether any material of the scene yields.
     pub yields: bool,
+    /// Law of friction of each contact of the scene.
+    pub friction: Vec<Option<Friction>>,
 }
 
 /// The problem at one displacement.
@@ -78,7 +82,7 @@ impl<'a> TornProblem<'a> {
         discrete: &'a Discrete,
         connection: &'a Interconnection<'a>,
         sums: &'a NodeSums<'a>,
-        Conditions { loads, rhs }: Conditions,
+        Conditions { loads, rhs, friction }: Conditions,
     ) -> Self {
         let Discrete { materials, constraints, bodies, .. } = discrete;
         let subdomains = &discrete.decomposition.subdomains[..];
@@ -98,6 +102,7 @@ impl<'a> TornProblem<'a> {
             space: &connection.space,
             sums,
             yields: bodies.iter().flat_map(|body| &body.materials).any(yields),
+            friction,
         }
     }
 }
@@ -119,9 +124,19 @@ impl TornProblem<'_> {
         self.regions().into_iter().zip(&self.firm).map(|(region, material)| Region { material, ..region }).collect()
     }
 
-    /// Without plastic material, one step solves the problem.
+    /// The laws of the rows.
+    pub fn laws(&self) -> Laws<'_> {
+        self.constraints.laws(&self.friction)
+    }
+
+    /// Whether surfaces rub on each other, on any rank.
+    pub fn has_friction(&self) -> bool {
+        self.friction.iter().any(Option::is_some)
+    }
+
+    /// Without plastic material and friction, one step solves the problem.
     pub fn is_linear(&self) -> bool {
-        !self.yields
+        !self.yields && !self.has_friction()
     }
 
     /// Internal forces and energies at `u`. One collective.
@@ -185,6 +200,7 @@ impl TornProblem<'_> {
         for (s, rhs) in slack.iter_mut().zip(&self.rhs) {
             *s = rhs - *s;
         }
+        slack.iter_mut().zip(&self.committed.slips).for_each(|(s, slip)| *s += slip);
         slack
     }
 
@@ -203,7 +219,7 @@ impl TornProblem<'_> {
 
     fn close(&self, slack: Vec<f64>, u: &mut Torn) {
         let mut correction = slack.clone();
-        self.constraints.laws().violation(&mut correction);
+        self.constraints.violation(&mut correction);
         self.coupling.borrow_mut().close(self.constraints, &slack, &mut correction);
         self.gather.add_transpose(1.0, &correction, u);
     }
@@ -211,7 +227,7 @@ impl TornProblem<'_> {
     /// Whether a displacement satisfies all constraints to round-off.
     pub fn is_admissible(&self, u: &Torn) -> bool {
         let mut violation = self.slack(u);
-        self.constraints.laws().violation(&mut violation);
+        self.constraints.violation(&mut violation);
         let squares = self.space.dots(&[(&violation, &violation), (&self.rhs, &self.rhs)]);
         squares[0] <= f64::EPSILON * squares[1]
     }
@@ -220,7 +236,7 @@ impl TornProblem<'_> {
     pub fn active_contacts(&self, lambda: &[f64]) -> usize {
         let active = |row: &usize| {
             let of = &self.constraints.rows[*row];
-            of.kind.is_contact() && of.law().status(lambda[*row]).is_closed()
+            of.law().opens() && of.law().status(lambda[*row]).is_closed()
         };
         let partial: Vec<f64> =
             self.space.owned().iter().map(|rows| rows.clone().filter(active).count() as f64).collect();

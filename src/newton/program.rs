@@ -3,9 +3,10 @@
 //! The dual is `min 1/2 l'F l - l'd` over `l_I >= 0`, `G l = e` with `e = R'f_k`, `d = B K^+ f_k - c_k` (paper, section 4).
 //! It starts from the last step's multipliers `l0`, corrected so that `G l0 = e`; the residual
 //! `d - F l0 = B K^+ (f_k - B'l0) - c_k` costs one application of F. Without inequalities PCPG solves it. With them the
-//! active set does, and where its sets come back SMALSE-M, on the homogeneous problem of `l - l0`.
+//! active set does, and where its sets come back SMALSE-M, on the homogeneous problem of `l - l0`. With Coulomb's friction SMALSE-M
+//! solves programs with given radii until these are those of the solution.
 
-use super::dual::{Dual, DualFace, Multipliers, WholeDual};
+use super::dual::{Dual, DualFace, Multipliers, WholeDual, sliding};
 use super::forcing::Forcing;
 use super::problem::TornProblem;
 use crate::feti::coarse::face::CoarseFace;
@@ -13,8 +14,12 @@ use crate::feti::coarse::{Coarse, Floating};
 use crate::qp::feasible::FeasibleSet;
 use crate::qp::pcpg::{Directions, Pcpg};
 use crate::qp::quadratic::{Quadratic, Space};
+use crate::qp::slides::{Disc, Slides};
 use crate::qp::{Limits, Outcome, Statistics, active_set, power, smalse};
 use crate::scene::Qp;
+
+/// Programs with given radii of friction that SMALSE-M solves at most, one after the other.
+const ROUNDS: usize = 60;
 
 /// How to solve the programs.
 #[derive(Clone, Copy, Debug)]
@@ -79,6 +84,8 @@ pub struct Programs {
     settings: ProgramSettings,
     /// Coarse problem of the rows that the last program kept. `None`: the next one starts from scratch.
     face: Option<CoarseFace>,
+    /// What friction does on these rows.
+    slides: Slides,
     /// The largest first residual of a solve so far.
     reference: Option<f64>,
     /// Whether the next program is the first of a solve.
@@ -89,7 +96,7 @@ pub struct Programs {
 impl Programs {
     /// Nothing is known yet.
     pub fn new(settings: ProgramSettings) -> Self {
-        Self { settings, face: None, reference: None, first: true, norm: None }
+        Self { settings, face: None, slides: Slides::default(), reference: None, first: true, norm: None }
     }
 
     /// What the next programs depend on.
@@ -127,10 +134,29 @@ impl Programs {
         self.face = Some(CoarseFace::new(coarse, kept));
     }
 
+    /// The next program begins with these discs of friction, and with what the `last` multipliers and what slides, `-slack`, tell of
+    /// them; a program that starts from scratch starts without friction. Collective.
+    pub fn slide(&mut self, coarse: &Coarse, discs: Vec<Disc>, last: &[f64], slack: &[f64]) {
+        let moved: Vec<f64> = slack.iter().map(|slack| -slack).collect();
+        self.slides = match &self.face {
+            Some(_) => Slides::told(discs, last, &moved),
+            None => Slides::open(discs),
+        };
+        if let Some(face) = self.face.take() {
+            self.face = Some(self.on_slides(coarse, face.kept().to_vec()));
+        }
+    }
+
+    /// Coarse problem of the kept rows, but in friction rows of those that slides leave free. Collective.
+    fn on_slides(&self, coarse: &Coarse, mut kept: Vec<bool>) -> CoarseFace {
+        self.slides.mark(&mut kept);
+        CoarseFace::sliding(coarse, kept, sliding(&self.slides))
+    }
+
     /// Multipliers with `G l = e` next to the `last` ones; the smallest such if the program starts from scratch.
     /// `resultants` are `e = R'f_k`: forces and moments on all clusters, whole on every rank. Collective.
     pub fn start(&self, coarse: &Coarse, last: &[f64], resultants: &[f64]) -> Vec<f64> {
-        let all = |coarse| CoarseFace::new(coarse, vec![true; last.len()]);
+        let all = |coarse| self.on_slides(coarse, vec![true; last.len()]);
         let mut lambda = vec![0.0; last.len()];
         let Some(face) = &self.face else {
             all(coarse).add_balance(coarse, resultants.to_vec(), &mut lambda);
@@ -190,6 +216,11 @@ impl Programs {
         Ok(found)
     }
 
+    /// What friction does on them.
+    pub fn slides(&self) -> &Slides {
+        &self.slides
+    }
+
     /// The rows that the last program kept, with their coarse problem.
     pub fn face(&self) -> Option<&CoarseFace> {
         self.face.as_ref()
@@ -197,7 +228,7 @@ impl Programs {
 
     /// The rows that the last program kept; all rows if there was none.
     fn take_face(&mut self, coarse: &Coarse, rows: usize) -> CoarseFace {
-        self.face.take().unwrap_or_else(|| CoarseFace::new(coarse, vec![true; rows]))
+        self.face.take().unwrap_or_else(|| self.on_slides(coarse, vec![true; rows]))
     }
 
     fn equalities(
@@ -225,7 +256,8 @@ impl Programs {
     ) -> (DualSolution, f64) {
         let space = Multipliers(problem.space, dual.timer);
         let rows = dual.timer.time("coarse set-up", || self.take_face(dual.coarse, lambda.len()));
-        let mut face = DualFace { dual, constraints: problem.constraints, resultants, rows };
+        let slides = self.slides.clone();
+        let mut face = DualFace { dual, constraints: problem.constraints, resultants, rows, slides };
         if let Some(known) = known {
             let mut projected = residual.clone();
             face.project(&mut projected);
@@ -253,10 +285,11 @@ impl Programs {
         limits: Limits,
     ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
-        let bounded = problem.constraints.laws().may_open();
+        let bounded = problem.constraints.may_open();
         let rows = dual.timer.time("coarse set-up", || self.take_face(dual.coarse, bounded.len()));
         let mut kept = rows.kept().to_vec();
-        let mut face = DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants, rows };
+        let slides = self.slides.clone();
+        let mut face = DualFace { dual: dual.reborrow(), constraints: problem.constraints, resultants, rows, slides };
         let timer = face.dual.timer;
         if !timer.time("coarse set-up", || face.complete(&mut kept)) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
@@ -264,14 +297,18 @@ impl Programs {
             return DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest: None };
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
-        let start = active_set::Guess { x, residual, kept, uneven: problem.constraints.uneven, directions };
+        face.slides.adopt(&kept);
+        let (slides, has_discs, uneven) =
+            (face.slides.clone(), problem.constraints.has_friction, problem.constraints.uneven);
+        let start = active_set::Guess { x, residual, kept, slides, has_discs, uneven, directions };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let at_floor = self.note(&limits, solution.first_norm);
-        let active_set::Solution { x: balanced, residual, outcome, statistics, directions, .. } = solution;
+        let active_set::Solution { x: balanced, residual, slides, outcome, statistics, directions, .. } = solution;
+        self.slides = slides;
         let spent = spent + statistics.hessian;
         let rest = Some(Rest { start: balanced.clone(), residual, directions, spent });
         let mut lambda = balanced.clone();
-        problem.constraints.laws().project(&mut lambda);
+        problem.laws().project(&mut lambda);
         let DualFace { dual, rows, .. } = face;
         self.face = Some(dual.timer.time("coarse set-up", || rows.settled(dual.coarse)));
         DualSolution { lambda, balanced, outcome, statistics, at_floor, rest }
@@ -293,6 +330,7 @@ impl Programs {
         let mean = timer.time("coarse problem", || projector.project(&mut projected));
         let mut statistics = Statistics::default();
         let (mut x, mut outcome, mut at_floor) = (vec![0.0; b.len()], Outcome::Converged, true);
+        let mut radii = self.slides.radii(&start);
         if space.norm(&projected) != 0.0 {
             if self.norm.is_none() {
                 let estimate = power::norm(&space, &mut dual, &projected);
@@ -308,23 +346,44 @@ impl Programs {
                 coarse.add_transpose(1.0, &a, &mut multiplier);
                 multiplier
             });
-            let lower = problem.constraints.laws().lower_bounds(&start);
+            let lower = problem.laws().lower_bounds(&start);
             // With a norm that is not a number SMALSE-M ends as `Outcome::NotFinite`.
             let norm = self.norm.unwrap_or(f64::NAN);
-            let solution = smalse::solve(
-                smalse::Problem { space: &space, function: &mut dual, b: &projected, set: &FeasibleSet::above(lower) },
-                &smalse::Settings { limits, norm },
-                smalse::Start { x, multiplier },
-            );
-            at_floor = self.note(&limits, solution.first_norm);
-            statistics += solution.statistics;
-            (x, outcome) = (solution.x, solution.outcome);
+            let mut multiplier = multiplier;
+            for round in 0..ROUNDS {
+                let set = match problem.constraints.has_friction {
+                    false => FeasibleSet::above(lower.clone()),
+                    true => FeasibleSet::with_discs(lower.clone(), self.slides.around(&start, &radii)),
+                };
+                let solution = smalse::solve(
+                    smalse::Problem { space: &space, function: &mut dual, b: &projected, set: &set },
+                    &smalse::Settings { limits, norm },
+                    smalse::Start { x, multiplier: multiplier.take() },
+                );
+                at_floor = if round == 0 { self.note(&limits, solution.first_norm) } else { at_floor };
+                statistics += solution.statistics;
+                (x, outcome) = (solution.x, solution.outcome);
+                if !problem.constraints.has_friction || outcome != Outcome::Converged {
+                    break;
+                }
+                // Under Coulomb's law the radii follow.
+                let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
+                let next = self.slides.radii(&lambda);
+                let change = self.slides.change(&radii, &next, lambda.len());
+                if space.norm(&change) <= limits.target(solution.first_norm) {
+                    break;
+                }
+                (radii, multiplier) = (next, Some(solution.multiplier));
+                outcome = Outcome::LimitReached;
+            }
         }
-        let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
+        let mut lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
-        let kept = problem.constraints.laws().kept(&lambda, 0.0);
-        self.face = Some(timer.time("coarse set-up", || CoarseFace::new(coarse, kept)));
+        self.slides.settle(&lambda, &radii);
+        problem.laws().project(&mut lambda);
+        let kept = problem.laws().kept(&lambda, 0.0);
+        self.face = Some(timer.time("coarse set-up", || self.on_slides(coarse, kept)));
         Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor, rest: None })
     }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::committed::Sizes;
 use super::problem::{SIGNIFICANT, State, TornProblem};
 use crate::constraint::Kind;
+use crate::constraint::law::Law;
 use crate::feti::Torn;
 use crate::work;
 
@@ -25,12 +26,15 @@ pub struct Residuals {
     pub gap: f64,
     /// Largest product of contact force and gap over largest contact force times largest displacement.
     pub complementarity: f64,
+    /// How far contact forces are from the law of friction ([`super::friction`]); zero without friction.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 impl Residuals {
-    /// The largest of the four; NaN if any is.
+    /// The largest of them; NaN if any is.
     pub fn largest(&self) -> f64 {
-        [self.equilibrium, self.gluing, self.gap, self.complementarity].into_iter().fold(0.0, larger)
+        [self.equilibrium, self.gluing, self.gap, self.complementarity, self.friction].into_iter().fold(0.0, larger)
     }
 }
 
@@ -70,10 +74,10 @@ impl TornProblem<'_> {
         let mut worst = [0.0_f64; 5];
         for ((row, &s), &force) in self.constraints.rows.iter().zip(&slack).zip(lambda) {
             let (gap, force) = (s / row.scale, row.scale * force);
-            let found = if row.kind.is_contact() {
-                [0.0, row.law().violation(gap).abs(), (gap * force).abs(), force.abs(), 0.0]
-            } else {
-                [s.abs() / row.length, 0.0, 0.0, 0.0, 0.0]
+            let found = match row.law() {
+                Law::Equality => [s.abs() / row.length, 0.0, 0.0, 0.0, 0.0],
+                Law::Friction => [0.0; 5],
+                law => [0.0, law.violation(gap).abs(), (gap * force).abs(), force.abs(), 0.0],
             };
             for (w, f) in worst.iter_mut().zip(found) {
                 *w = if f.is_nan() { f } else { w.max(f) };
@@ -89,6 +93,7 @@ impl TornProblem<'_> {
             gluing: relative(glue, size),
             gap: relative(gap, size),
             complementarity: relative(product, larger(before.contact_force, contact_force) * size),
+            friction: self.friction_residual(&slack, lambda, (larger(before.contact_force, contact_force), size)),
         };
         (residuals, Sizes { elastic_norm: 0.0, force_square, displacement, contact_force })
     }

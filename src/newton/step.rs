@@ -16,6 +16,7 @@ use super::problem::{State, TornProblem};
 use super::program::{DualSolution, ProgramSettings, ProgramState, Programs, Rest};
 use crate::assembly::flow::{self, Flow};
 use crate::assembly::internal;
+use crate::constraint::friction::Slider;
 use crate::feti::Torn;
 use crate::feti::coarse::Coarse;
 use crate::feti::coarse::motion;
@@ -25,13 +26,19 @@ use crate::feti::inverse::basis::Bases;
 use crate::feti::inverse::factor::NotDefinite;
 use crate::feti::inverse::tangents::Linearisation;
 use crate::feti::preconditioner::Preconditioner;
+use crate::feti::preconditioner::flexibility::Flexibility;
 use crate::monitor::timing::Timer;
 use crate::qp::pcpg::Directions;
+use crate::qp::slides::Disc;
 use crate::qp::{Outcome, Statistics};
 use crate::sparse::cholesky::Precision;
 
 /// Residual of the subdomains' problems that is small enough whatever the accuracy of the step.
 const EXACT: f64 = 1e-8;
+
+/// A force on a node moves it this many times as far as if its neighbours stood still. Slides of friction find their sets soonest
+/// with 3 to 6.
+const NEIGHBOURS: f64 = 3.0;
 
 /// Result of one step.
 pub struct Step {
@@ -119,7 +126,7 @@ impl<'a> StepSolver<'a> {
         let mut lambda = vec![0.0; kept.len()];
         problem.gather.apply(&problem.unbalance(state), &mut lambda);
         problem.coupling.borrow_mut().solve(&mut lambda, |row| kept[row]);
-        problem.constraints.laws().project_onto(&kept, &mut lambda);
+        problem.laws().project_onto(&kept, &mut lambda);
         self.programs.expect(&self.coarse, kept);
         lambda
     }
@@ -188,6 +195,11 @@ impl<'a> StepSolver<'a> {
         let (mut forces, mut open) = (problem.unbalance(state), slack.clone());
         let lifted = self.operator.lift(problem.constraints, &mut forces, &mut open);
 
+        if problem.constraints.has_friction {
+            let discs = self.discs(problem);
+            timer.time("coarse set-up", || self.programs.slide(&self.coarse, discs, last, &open));
+        }
+
         // lambda (14), from multipliers with G lambda = e and the residual d - F lambda there.
         let (resultants, lambda) = timer.time("coarse problem", || {
             let e = recover::resultants(problem.subdomains, problem.modes, &self.coarse, &forces);
@@ -233,7 +245,8 @@ impl<'a> StepSolver<'a> {
 
         // What the tolerance of the program left open is closed.
         if let (Some(preconditioner), Some(face)) = (&mut self.preconditioner, self.programs.face()) {
-            preconditioner.close(problem.constraints, &slack, face.kept(), &mut recovered.du, timer);
+            let kept = self.programs.slides().held(face.kept());
+            preconditioner.close(problem.constraints, &slack, &kept, &mut recovered.du, timer);
         }
         let Recovered { du, local_residual, refined } = recovered;
         let DualSolution { lambda, outcome, at_floor, .. } = found;
@@ -302,12 +315,38 @@ impl<'a> StepSolver<'a> {
 
         // R alpha, from B du - c_k in the rows that are kept.
         defect.iter_mut().zip(open).for_each(|(d, c)| *d -= c);
+        self.programs.slides().add_compliance(-1.0, balanced, &mut defect);
         if let Some(face) = self.programs.face() {
             let coarse = &self.coarse;
-            let back = timer.time("coarse problem", || motion::amplitudes(face, coarse, problem.space, &defect));
+            let back =
+                timer.time("coarse problem", || motion::amplitudes(face, coarse, problem.space, constraints, &defect));
             recover::add_rigid_motion(problem.subdomains, problem.modes, coarse, -1.0, &back, &mut du);
         }
         Recovered { du, local_residual, refined }
+    }
+
+    /// The discs of friction. Takes the neighbour exchanges of [`Flexibility::new`] if there is no preconditioner.
+    fn discs(&self, problem: &TornProblem) -> Vec<Disc> {
+        let constraints = problem.constraints;
+        let stiffness = (0..problem.subdomains.len()).map(|own| self.operator.inverse.stiffness(own));
+        let stiffness = stiffness.map(|(symbolic, values)| (&symbolic.pattern, values));
+        let made = match &self.preconditioner {
+            Some(_) => None,
+            None => Some(Flexibility::new(constraints, problem.gather, stiffness)),
+        };
+        let known = self.preconditioner.as_ref().map(Preconditioner::flexibility);
+        let flexibility = known.or(made.as_ref()).expect("one of them is there");
+        let disc = |(slider, radius): (&Slider, [f64; 2])| {
+            let rows: Vec<usize> = slider.tangents.iter().map(|tangent| tangent.row).collect();
+            let sum: f64 = rows.iter().map(|&row| flexibility.of_row(constraints, row)).sum();
+            Disc {
+                normal: slider.normal,
+                entries: (rows[0], rows.get(1).copied()),
+                radius,
+                flexibility: sum / rows.len() as f64 * NEIGHBOURS,
+            }
+        };
+        problem.laws().radii().map(disc).collect()
     }
 
     /// `torn = K^+ (torn - B' x)` and `y = B torn`.

@@ -1,4 +1,4 @@
-//! Active set of bounds around PCPG: min 1/2 x'A x - x'd over { x_i >= 0 for bounded i, G x = e }.
+//! Active set of bounds around PCPG: min 1/2 x'A x - x'd over { x_i >= 0 for bounded i, |x_T| <= r for discs T, G x = e }.
 //!
 //! The fast path of contact: guess the rows that carry a force, solve the equality problem on them, correct the guess
 //! (the primal-dual active set strategy, Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2002), applied to the dual).
@@ -10,12 +10,17 @@
 //! problems are solved to the tolerance where stiffness jumps, more exactly after a correction that is much larger than an earlier one,
 //! and more exactly for good each time that a set comes back, to the tolerance in the end.
 //!
+//! Discs ([`super::slides`]) are corrected along with the bounds. Where none of them changes its set, radii and directions of slips
+//! follow once they are further off than the residual. Then the caller's `A` includes the springs across slips. Where radii grow with
+//! bounded unknowns a solution is a fixed point, and minimises the function over the discs that it has itself.
+//!
 //! No proof of convergence goes with it: sets that come back end as [`Outcome::Cycled`], and the caller turns to
 //! [`super::smalse`]. Unlike there x is not homogenised: bounds are zero and the equalities have a right-hand side,
 //! both the caller's affair, since the projector changes with the set.
 
 use super::pcpg::{Directions, Pcpg};
 use super::quadratic::{Quadratic, Space};
+use super::slides::Slides;
 use super::{Limits, Outcome, Statistics, axpy};
 
 /// Factor by which the residual drops between two looks at the set.
@@ -28,16 +33,18 @@ const LEAST: f64 = 1e-3;
 const GROWTH: f64 = 2.0;
 /// Sets that are tried at most.
 const SETS: usize = 60;
+/// How often directions and radii of discs are followed at most.
+const FOLLOWS: usize = 100;
 /// A move of x smaller than this, relative to x, is rounding.
 const ROUNDING: f64 = 1e-13;
 
 /// The problem on the rows of a set. All answers must be the same on all ranks.
 pub trait Face: Quadratic {
-    /// From now on x, P and M are restricted to the kept rows; x is zero elsewhere. Adds rows if G x = e has no solution on
-    /// the kept ones (a body that nothing holds). False if it has none then.
-    fn restrict(&mut self, kept: &mut [bool]) -> bool;
+    /// From now on x, P and M are restricted to the kept rows, in discs to what slides leave free; elsewhere x is what they fix, or
+    /// zero. Adds rows if G x = e has no solution on the kept ones (a body that nothing holds). False if it has none then.
+    fn restrict(&mut self, kept: &mut [bool], slides: &Slides) -> bool;
 
-    /// Moves x to the nearest point of { G x = e, x = 0 off the kept rows }.
+    /// Moves x, which is what it has to be off the kept rows, to the nearest point with G x = e.
     fn restore(&mut self, x: &mut [f64]);
 
     /// Replaces `residual` = d - A x by residual - G'a, with an a that makes this vanish on the kept rows if x is the solution there.
@@ -53,6 +60,8 @@ pub struct Solution {
     pub residual: Vec<f64>,
     /// Rows where x need not be zero.
     pub kept: Vec<bool>,
+    /// What is known of discs.
+    pub slides: Slides,
     /// How it ended.
     pub outcome: Outcome,
     /// What it took.
@@ -71,6 +80,10 @@ pub struct Guess {
     pub residual: Vec<f64>,
     /// The first set, to which the face is restricted already; true for all rows without a bound.
     pub kept: Vec<bool>,
+    /// The discs with a guess of what they do, to which the face is restricted already.
+    pub slides: Slides,
+    /// Whether any rank has discs.
+    pub has_discs: bool,
     /// Whether rows are of unequal length, as where stiffness jumps.
     pub uneven: bool,
     /// Directions on the first set.
@@ -80,7 +93,7 @@ pub struct Guess {
 /// Solves the problem. Give `limits` a reference at a warm start: the default is the first residual, which is too small
 /// there.
 pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Guess, limits: &Limits) -> Solution {
-    let Guess { x, residual, kept, uneven, directions } = start;
+    let Guess { x, residual, kept, slides, has_discs, uneven, directions } = start;
     let n = x.len();
     let mut run = Run {
         space,
@@ -89,16 +102,20 @@ pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Gu
         x: x.clone(),
         residual,
         kept,
+        slides,
+        has_discs,
         work: vec![0.0; n],
         image: vec![0.0; n],
         statistics: Statistics::default(),
         first_norm: f64::NAN,
     };
     let mut solver = Pcpg::with(space, directions);
+    run.slides.add_compliance(-1.0, &x, &mut run.residual);
     let outcome = run.iterate(face, &mut solver, x, limits);
+    run.slides.add_compliance(1.0, &run.x, &mut run.residual);
     let directions = solver.into_directions();
-    let Run { x, residual, kept, statistics, first_norm, .. } = run;
-    Solution { x, residual, kept, outcome, statistics, first_norm, directions }
+    let Run { x, residual, kept, slides, statistics, first_norm, .. } = run;
+    Solution { x, residual, kept, slides, outcome, statistics, first_norm, directions }
 }
 
 struct Run<'a> {
@@ -108,6 +125,9 @@ struct Run<'a> {
     x: Vec<f64>,
     residual: Vec<f64>,
     kept: Vec<bool>,
+    slides: Slides,
+    /// Whether any rank has discs.
+    has_discs: bool,
     work: Vec<f64>,
     image: Vec<f64>,
     statistics: Statistics,
@@ -119,10 +139,10 @@ impl Run<'_> {
     fn iterate(&mut self, face: &mut dyn Face, solver: &mut Pcpg, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
         let mut target = None;
         // The sets so far, and how far the residual of each drops before it is corrected.
-        let (mut history, mut loose) = (Vec::new(), if self.uneven { 0.0 } else { LOOSE });
+        let (mut history, mut loose) = (vec![self.names()], if self.uneven { 0.0 } else { LOOSE });
         let (mut smallest, mut wanders) = (f64::INFINITY, false);
-        while history.len() < SETS {
-            history.push(self.kept.clone());
+        let mut follows = 0;
+        while history.len() <= SETS && follows < FOLLOWS {
             self.move_to(face, &mut wish);
             self.statistics.sets += 1;
             if target.is_none() {
@@ -139,17 +159,31 @@ impl Run<'_> {
                 if report.outcome != Outcome::Converged {
                     return report.outcome;
                 }
-                let changes = self.correct(face, target);
-                if changes > 0.0 {
-                    break changes;
-                }
-                if report.norm <= target {
-                    return Outcome::Converged;
+                match self.correct(face, target, report.norm) {
+                    Correction::None if report.norm <= target => return Outcome::Converged,
+                    Correction::None => {}
+                    Correction::Shift if follows < FOLLOWS => {
+                        follows += 1;
+                        self.statistics.sets += 1;
+                        wish.copy_from_slice(&self.x);
+                        self.move_to(face, &mut wish);
+                        solver.descend(&mut self.x, &mut self.residual);
+                    }
+                    Correction::Shift => return Outcome::Cycled,
+                    Correction::Set(changes) => break changes,
                 }
             };
             solver.forget();
-            if !face.restrict(&mut self.kept) {
+            let complete = face.restrict(&mut self.kept, &self.slides);
+            self.slides.adopt(&self.kept);
+            self.slides.add_compliance(-1.0, &self.x, &mut self.residual);
+            if !complete {
                 return Outcome::Cycled;
+            }
+            wish.copy_from_slice(&self.x);
+            if changes == 0.0 {
+                follows += 1;
+                continue;
             }
             wanders = changes > GROWTH * smallest;
             smallest = smallest.min(changes);
@@ -160,7 +194,7 @@ impl Run<'_> {
                 loose = if loose > LEAST { loose * TIGHTER } else { 0.0 };
                 history.clear();
             }
-            wish.copy_from_slice(&self.x);
+            history.push(self.names());
         }
         Outcome::Cycled
     }
@@ -170,6 +204,7 @@ impl Run<'_> {
         for (w, kept) in wish.iter_mut().zip(&self.kept) {
             *w *= f64::from(*kept);
         }
+        self.slides.fix(wish);
         face.restore(wish);
         for ((move_, w), x) in self.work.iter_mut().zip(&*wish).zip(&self.x) {
             *move_ = w - x;
@@ -190,24 +225,64 @@ impl Run<'_> {
         self.space.norm(&self.work)
     }
 
-    /// Lets rows of negative force go and takes rows of violated gap in; returns how many, over all ranks. The tolerance of
-    /// gaps keeps rows that have neither force nor gap from coming and going.
-    fn correct(&mut self, face: &mut dyn Face, tolerance: f64) -> f64 {
+    /// Lets rows of negative force go and takes rows of violated gap in, and corrects discs. The tolerance of gaps keeps rows that have
+    /// neither force nor gap from coming and going. Where the set is another one `residual` is without springs afterwards.
+    fn correct(&mut self, face: &mut dyn Face, tolerance: f64, norm: f64) -> Correction {
         self.work.copy_from_slice(&self.residual);
         face.gaps(&mut self.work);
+        let mut moved = Vec::new();
+        if !self.slides.is_empty() {
+            moved.clone_from(&self.work);
+            self.slides.add_compliance(1.0, &self.x, &mut moved);
+        }
         for i in 0..self.x.len() {
             let wanted = if self.kept[i] { self.x[i] >= 0.0 } else { self.work[i] > tolerance };
             let changes = self.bounded[i] && wanted != self.kept[i];
             self.kept[i] ^= changes;
             self.work[i] = f64::from(changes);
         }
-        self.space.dot(&self.work, &self.work)
+        if !self.has_discs {
+            let changes = self.space.dot(&self.work, &self.work);
+            return if changes > 0.0 { Correction::Set(changes) } else { Correction::None };
+        }
+        let next = self.slides.next(&self.x, &moved, tolerance);
+        let [mut fixed, mut hung] = [(); 2].map(|()| vec![0.0; self.x.len()]);
+        self.slides.compare(&next, &self.x, [&mut self.work, &mut fixed, &mut hung]);
+        let d = self.space.dots(&[(&self.work, &self.work), (&fixed, &fixed), (&hung, &hung)]);
+        let enough = norm.max(tolerance);
+        if d[0] > 0.0 || d[2].sqrt() > enough {
+            self.slides.add_compliance(1.0, &self.x, &mut self.residual);
+            self.slides.states = next;
+            self.slides.mark(&mut self.kept);
+            return Correction::Set(d[0]);
+        }
+        if d[1].sqrt() > enough {
+            self.slides.shift(&next);
+            return Correction::Shift;
+        }
+        Correction::None
+    }
+
+    /// What tells the present set from others.
+    fn names(&self) -> Vec<bool> {
+        self.kept.iter().copied().chain(self.slides.names()).collect()
     }
 
     /// Whether the present set has been there before, on all ranks.
     fn seen(&self, history: &[Vec<bool>]) -> bool {
-        history.iter().any(|old| self.space.minimum(f64::from(*old == self.kept)) == 1.0)
+        let names = self.names();
+        history.iter().any(|old| self.space.minimum(f64::from(*old == names)) == 1.0)
     }
+}
+
+/// What a correction did, on all ranks.
+enum Correction {
+    /// Nothing: the set stands.
+    None,
+    /// Discs fix their unknowns elsewhere; matrix and set stay as they are.
+    Shift,
+    /// The set is another one, or springs are; with the number of bounds and discs that changed theirs.
+    Set(f64),
 }
 
 #[cfg(test)]
@@ -221,13 +296,21 @@ mod tests {
 
     fn from(torn: &mut Torn, x: Vec<f64>, mut kept: Vec<bool>, limits: &Limits) -> Solution {
         let bounded = torn.bounded.clone();
-        assert!(torn.restrict(&mut kept));
+        assert!(torn.restrict(&mut kept, &Slides::default()));
         let residual = torn.f.times(&x).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();
         solve(
             &Plain,
             torn,
             &bounded,
-            Guess { x, residual, kept, uneven: false, directions: Directions::default() },
+            Guess {
+                x,
+                residual,
+                kept,
+                slides: Slides::default(),
+                has_discs: false,
+                uneven: false,
+                directions: Directions::default(),
+            },
             limits,
         )
     }
@@ -247,7 +330,7 @@ mod tests {
             let (rows, carrying) =
                 (torn.bounded.iter().filter(|b| **b).count(), fast.kept.iter().filter(|k| !**k).count());
             assert!(carrying > 0 && carrying < rows, "{carrying} of {rows}");
-            torn.restrict(&mut fast.kept.clone());
+            torn.restrict(&mut fast.kept.clone(), &Slides::default());
             let mut gaps = fast.residual.clone();
             torn.gaps(&mut gaps);
             for i in (0..n).filter(|i| torn.bounded[*i]) {
@@ -275,7 +358,7 @@ mod tests {
     fn norm_of_a_dual_problem() {
         let mut torn = Torn::membrane(3, 5);
         let n = torn.d.len();
-        torn.restrict(&mut vec![true; n]);
+        torn.restrict(&mut vec![true; n], &Slides::default());
         let start = torn.d.clone();
         let found = power::norm(&Plain, &mut torn, &start).expect("an estimate");
         assert!(found.products <= 12);
@@ -287,7 +370,7 @@ mod tests {
         let n = torn.d.len();
         let limits = Limits { products: 5, ..LIMITS };
         assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &limits).outcome, Outcome::LimitReached);
-        assert!(!torn.restrict(&mut vec![false; n]));
+        assert!(!torn.restrict(&mut vec![false; n], &Slides::default()));
         torn.f.entries[3] = f64::NAN;
         assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS).outcome, Outcome::NotFinite);
     }

@@ -22,7 +22,7 @@ const POINT: f64 = 64.0 * f64::EPSILON;
 /// The pairs of entries within a distance of a centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
-    /// The indices of the two entries, which have no lower bound.
+    /// The indices of the two entries, which have no lower bound; twice the same for an interval.
     pub entries: [usize; 2],
     /// The centre.
     pub centre: [f64; 2],
@@ -54,12 +54,14 @@ pub enum Place {
 impl Disc {
     /// The pair's entries of a vector.
     fn of(&self, x: &[f64]) -> [f64; 2] {
-        self.entries.map(|i| x[i])
+        let [i, j] = self.entries;
+        [x[i], if i == j { 0.0 } else { x[j] }]
     }
 
     /// Sets the pair's entries of a vector.
     fn put(&self, x: &mut [f64], pair: [f64; 2]) {
-        self.entries.into_iter().zip(pair).for_each(|(i, value)| x[i] = value);
+        // An interval's second number is none.
+        self.entries.into_iter().zip(pair).rev().for_each(|(i, value)| x[i] = value);
     }
 
     /// x - c.

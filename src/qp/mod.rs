@@ -8,6 +8,7 @@
 //!   only one that knows [`discs`];
 //! - [`pcpg`]: equalities only, with all search directions kept;
 //! - [`active_set`]: guesses the active bounds, solves for equalities, corrects the guess: fast, but without a proof;
+//! - [`slides`]: discs in active sets;
 //! - [`nnls`]: small dense nonnegative least squares: whether a force can be made of pushes;
 //! - [`power`]: estimate of the norm of P A P that the penalty and the step lengths are scaled by.
 //!
@@ -21,6 +22,7 @@ pub mod nnls;
 pub mod pcpg;
 pub mod power;
 pub mod quadratic;
+pub mod slides;
 pub mod smalse;
 
 mod penalty;
@@ -96,7 +98,7 @@ pub struct Limits {
 
 impl Limits {
     /// The gradient norm to reach from `first`.
-    fn target(&self, first: f64) -> f64 {
+    pub fn target(&self, first: f64) -> f64 {
         (self.relative * self.reference.unwrap_or(first)).max(self.absolute).max(self.drop * first)
     }
 }

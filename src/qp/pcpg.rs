@@ -97,6 +97,11 @@ impl<'a> Pcpg<'a> {
         self.directions
     }
 
+    /// Takes `x` to the minimum along the directions that it knows; see [`Directions::descend`].
+    pub fn descend(&self, x: &mut [f64], residual: &mut [f64]) {
+        self.directions.descend(self.space, x, residual);
+    }
+
     /// Drops the directions; due when A or the range of P has changed.
     pub fn forget(&mut self) {
         self.directions = Directions::default();

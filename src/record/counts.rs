@@ -33,6 +33,8 @@ pub struct Sizes {
     pub dirichlet_rows: u64,
     /// Rows of contact.
     pub contact_rows: u64,
+    /// Rows of B along the surfaces of contacts with friction.
+    pub friction_rows: u64,
     /// Keys of those above that are estimated; from `check` of large scenes only.
     pub estimated: Vec<String>,
 }

@@ -16,6 +16,9 @@ pub struct State {
     pub contact_force: Option<[f64; 3]>,
     /// Force of each contact on the body that the scene names first, whichever surface is the slave.
     pub contact_forces: BTreeMap<String, [f64; 3]>,
+    /// Friction at each contact that has any.
+    #[serde(default)]
+    pub friction: BTreeMap<String, Rubbed>,
     /// Force of each support on the bodies.
     pub reactions: BTreeMap<String, [f64; 3]>,
     /// What acts on each body.
@@ -24,7 +27,7 @@ pub struct State {
     pub external_work: Option<f64>,
     /// `Psi(u)`.
     pub internal_energy: Option<f64>,
-    /// `J(u) = Psi(u) - f'u`.
+    /// `J(u) = Psi(u) - f'u`; with what friction dissipates if its limit is given (Tresca), so that it is what is minimised.
     pub energy: Option<f64>,
     /// Largest length of a nodal displacement.
     pub max_displacement: Option<f64>,
@@ -39,6 +42,19 @@ pub struct State {
     /// How near it is to the limits of small strains and displacements.
     #[serde(flatten)]
     pub measures: Measures,
+}
+
+/// Friction at a contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rubbed {
+    /// Friction force on the body that the scene names first.
+    pub force: [f64; 3],
+    /// What the increment dissipates: friction force times slip (energy).
+    pub dissipation: f64,
+    /// Pairs that touch, or have a given limit of friction, and do not slip.
+    pub sticking: u64,
+    /// Pairs that slip.
+    pub slipping: u64,
 }
 
 /// The largest value of a measure, and where it is.
@@ -147,6 +163,9 @@ pub struct Residuals {
     /// Pressure across open gaps.
     #[serde(rename = "residual_complementarity")]
     pub complementarity: Option<f64>,
+    /// Distance of contact forces from the law of friction; zero without friction.
+    #[serde(rename = "residual_friction", default)]
+    pub friction: Option<f64>,
     /// Unbalanced force or moment of a body.
     #[serde(rename = "residual_balance")]
     pub balance: Option<f64>,

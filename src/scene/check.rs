@@ -6,8 +6,9 @@
 use super::Fault;
 use super::Scene;
 use super::body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
-use super::contact::{Contact, Sides};
+use super::contact::{Contact, Friction, Sides};
 use super::decomposition::{Groups, Method};
+use super::goal::ErrorOf;
 use super::held::Held;
 use super::initial::Initial;
 use super::load::Load;
@@ -35,6 +36,7 @@ pub(super) fn scene(scene: &Scene) -> Checked {
     decomposition(scene)?;
     solver(&scene.solver)?;
     scene.solver.error_of.goal().map_or(Ok(()), |goal| goal.check(scene))?;
+    error_with_friction(scene)?;
     scene.steps().iter().try_for_each(|step| compatible_supports(scene, step))?;
     scene.body.keys().try_for_each(|name| holding(scene, name))
 }
@@ -153,6 +155,9 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
         require(clearance.is_finite(), &key, clearance, "must be a finite number")?;
         require(contact.gap == 0.0, &key, clearance, "stands instead of any gap: remove gap, or clearance")?;
     }
+    if let Some(law) = contact.friction {
+        friction(&format!("{key}.{}", law.key()), law)?;
+    }
     let (first, second) = match &contact.sides {
         Sides::Named { .. } => ("slave", "master"),
         Sides::Either(_) => ("surfaces", "surfaces"),
@@ -181,6 +186,26 @@ fn contact(scene: &Scene, key: &str, contact: &Contact) -> Checked {
     let twin = earlier(scene, contact).find(same);
     let rule = |twin: &str| format!("contact.{twin} is between the same two surfaces; remove one of the two");
     twin.map_or(Ok(()), |(twin, _)| require(false, &key, other.to_string(), rule(twin)))
+}
+
+/// Errors that were asked for need a minimum (of the energy), or a symmetric dual problem (of a number).
+fn error_with_friction(scene: &Scene) -> Checked {
+    let laws = || scene.contact.iter().filter_map(|(name, contact)| Some((name, contact.friction?)));
+    let Some(error) = scene.solver.error.filter(|_| laws().any(|(_, law)| law.value() > 0.0)) else { return Ok(()) };
+    let coulomb = laws().find(|(_, law)| matches!(law, Friction::Coulomb(_)) && law.value() > 0.0);
+    if let (ErrorOf::Energy, Some((name, _))) = (&scene.solver.error_of, coulomb) {
+        let rule =
+            format!("with contact.{name}.friction there is no energy that is least: ask for error_of = \"stress\"");
+        return require(false, "solver.error", error, rule);
+    }
+    let rule = "errors of single numbers are estimated without friction only: ask for that of the stress";
+    require(scene.solver.error_of.goal().is_none(), "solver.error", error, rule)
+}
+
+/// A coefficient of friction, or a limit of its stress.
+fn friction(key: &str, law: Friction) -> Checked {
+    let value = law.value();
+    require(value.is_finite() && value >= 0.0, key, value, "must be a finite number that is not negative")
 }
 
 /// The contacts before this one.
@@ -222,6 +247,13 @@ fn step(scene: &Scene, key: &str, step: &Step) -> Checked {
         let rule = known("contact whose obstacle has a displacement", moving.iter().copied());
         require(moving.contains(&name), &key, factor, rule)?;
         finite(&key, factor)?;
+    }
+    for (name, &value) in &step.friction {
+        let key = format!("{key}.friction.{name}");
+        let laws = scene.contact.iter().filter(|(_, contact)| contact.friction.is_some()).map(|(name, _)| name);
+        let rule = known("contact with friction or shear_limit of its own", laws);
+        let law = scene.contact.get(name).and_then(|contact| contact.friction);
+        law.map_or_else(|| require(false, &key, value, rule), |law| friction(&key, law.with(value)))?;
     }
     Ok(())
 }

@@ -1,10 +1,11 @@
-//! What may touch what: two surfaces, or a surface and a rigid obstacle. Without friction.
+//! What may touch what: two surfaces, or a surface and a rigid obstacle; with friction or without.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use super::require::{Checked, all_finite, require};
+use super::step::Step;
 use super::surface::SurfaceName;
 
 /// A contact. Each slave node carries one condition.
@@ -18,6 +19,42 @@ pub struct Contact {
     /// The distance everywhere, whatever that of the meshes is (length): for surfaces that are meant to fit, where facets
     /// would leave gaps and overlaps of their own.
     pub clearance: Option<f64>,
+    /// What resists sliding, if anything does.
+    pub friction: Option<Friction>,
+}
+
+/// A law of friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Friction {
+    /// Coulomb: the friction stress is at most this share of the pressure.
+    Coulomb(f64),
+    /// Tresca: the friction stress is at most this, whatever the pressure, also where surfaces are apart (stress).
+    Tresca(f64),
+}
+
+impl Friction {
+    /// The coefficient, or the limit of the stress.
+    pub fn value(self) -> f64 {
+        match self {
+            Self::Coulomb(value) | Self::Tresca(value) => value,
+        }
+    }
+
+    /// The same law with another coefficient or limit.
+    pub fn with(self, value: f64) -> Self {
+        match self {
+            Self::Coulomb(_) => Self::Coulomb(value),
+            Self::Tresca(_) => Self::Tresca(value),
+        }
+    }
+
+    /// The key of its value in scenes.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Coulomb(_) => "friction",
+            Self::Tresca(_) => "shear_limit",
+        }
+    }
 }
 
 /// The two sides of a contact. The nodes of the slave must not enter the other side.
@@ -50,6 +87,11 @@ impl Contact {
             Sides::Rigid { displacement, .. } => displacement.unwrap_or_default(),
             Sides::Named { .. } | Sides::Either(_) => [0.0; 3],
         }
+    }
+
+    /// Whether there is friction in any of these steps.
+    pub fn rubs(&self, name: &str, steps: &[Step]) -> bool {
+        steps.iter().any(|step| step.friction(name, self).is_some())
     }
 
     /// Every surface that takes part: both, or the slave of an obstacle.
@@ -184,6 +226,8 @@ struct Section {
     clearance: Option<f64>,
     rigid: Option<Obstacle>,
     displacement: Option<[f64; 3]>,
+    friction: Option<f64>,
+    shear_limit: Option<f64>,
 }
 
 /// Keys of the section that contradict each other.
@@ -199,6 +243,8 @@ enum SectionError {
         "displacement moves a rigid obstacle, and there is none: surfaces move with supports and loads of their bodies"
     )]
     NothingToMove,
+    #[error("friction (Coulomb) and shear_limit (Tresca) are two laws of friction: remove one")]
+    TwoLaws,
     #[error("a contact needs a slave (a surface) with a master or a rigid obstacle, or two surfaces")]
     NoSlave,
 }
@@ -207,7 +253,7 @@ impl TryFrom<Section> for Contact {
     type Error = SectionError;
 
     fn try_from(section: Section) -> Result<Self, SectionError> {
-        let Section { slave, master, surfaces, gap, clearance, rigid, displacement } = section;
+        let Section { slave, master, surfaces, gap, clearance, rigid, displacement, friction, shear_limit } = section;
         if rigid.is_none() && displacement.is_some() {
             return Err(SectionError::NothingToMove);
         }
@@ -220,13 +266,20 @@ impl TryFrom<Section> for Contact {
             (None, Some(_), None, None) => return Err(SectionError::OneSided),
             (None, Some(_), Some(_), Some(_)) => return Err(SectionError::ThreeSided),
         };
-        Ok(Self { sides, gap, clearance })
+        let friction = match (friction, shear_limit) {
+            (Some(_), Some(_)) => return Err(SectionError::TwoLaws),
+            (friction, limit) => friction.map(Friction::Coulomb).or(limit.map(Friction::Tresca)),
+        };
+        Ok(Self { sides, gap, clearance, friction })
     }
 }
 
 impl From<Contact> for Section {
-    fn from(Contact { sides, gap, clearance }: Contact) -> Self {
-        let empty = Self { slave: None, master: None, surfaces: None, gap, clearance, rigid: None, displacement: None };
+    fn from(Contact { sides, gap, clearance, friction: law }: Contact) -> Self {
+        let of = |key: &str| law.filter(|law| law.key() == key).map(Friction::value);
+        let (friction, shear_limit) = (of("friction"), of("shear_limit"));
+        let (slave, master, surfaces, rigid, displacement) = (None, None, None, None, None);
+        let empty = Self { slave, master, surfaces, gap, clearance, rigid, displacement, friction, shear_limit };
         match sides {
             Sides::Named { slave, master } => Self { slave: Some(slave), master: Some(master), ..empty },
             Sides::Either(surfaces) => Self { surfaces: Some(surfaces), ..empty },

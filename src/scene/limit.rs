@@ -58,6 +58,11 @@ impl Limit {
         if !scene.step.is_empty() {
             return fault("the limit load does not depend on a history: remove the steps, or this section");
         }
+        if scene.contact.values().any(|contact| contact.friction.is_some_and(|law| law.value() > 0.0)) {
+            return fault(
+                "limit loads are bounded by the work of the loads, which friction is no part of: remove friction and shear_limit, or this section",
+            );
+        }
         if scene.initial.is_some() {
             return fault("the limit load does not depend on an earlier state: remove [initial], or this section");
         }

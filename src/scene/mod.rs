@@ -38,7 +38,7 @@ use crate::material::{Law, Material};
 
 pub use body::{Axis, Body, Brick, Gmsh, Rotation, Shape};
 pub use changes::changes;
-pub use contact::{Contact, Obstacle, Sides};
+pub use contact::{Contact, Friction, Obstacle, Sides};
 pub use decomposition::{Decomposition, Groups, Method, PAPER_CELLS};
 pub use error::{Fault, Place, SceneError};
 pub use goal::{Direction, ErrorOf, Goal};

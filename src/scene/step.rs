@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::contact::{Contact, Friction};
+
 /// A stretch of the load history. Loads and prescribed displacements go in a straight line from their values at the end
 /// of the step before (zero at the beginning) to the ones given here.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,6 +26,8 @@ pub struct Step {
     pub support: BTreeMap<String, f64>,
     /// Factors of the displacements of some contacts' obstacles, by name, instead of `amplitude`.
     pub contact: BTreeMap<String, f64>,
+    /// Coefficients of friction (or limits of its stress) of some contacts during the step, by name, instead of their own.
+    pub friction: BTreeMap<String, f64>,
 }
 
 /// The history of a scene that gives none: everything at once.
@@ -42,6 +46,7 @@ impl Step {
             load: BTreeMap::new(),
             support: BTreeMap::new(),
             contact: BTreeMap::new(),
+            friction: BTreeMap::new(),
         }
     }
 
@@ -58,6 +63,13 @@ impl Step {
     /// Factor of the displacement of this contact's obstacle at the end of the step.
     pub fn of_contact(&self, name: &str) -> f64 {
         self.contact.get(name).copied().unwrap_or(self.amplitude)
+    }
+
+    /// The law of friction of this contact during the step; none without friction.
+    pub fn friction(&self, name: &str, contact: &Contact) -> Option<Friction> {
+        let law = contact.friction?;
+        let law = self.friction.get(name).map_or(law, |value| law.with(*value));
+        (law.value() > 0.0).then_some(law)
     }
 }
 

@@ -22,17 +22,18 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
     let mut partial = Vec::new();
     for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
         let touches = subdomain.facets.iter().any(|facet| discrete.contacts.surfaces.contains(&facet.surface));
-        let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0, f64::from(touches)];
+        let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0, 0.0, f64::from(touches)];
         for row in rows.clone() {
             counts[match constraints.rows[row].kind {
                 Kind::Gluing => 1,
                 Kind::Support { .. } => 2,
                 Kind::Contact { .. } => 3,
+                Kind::Friction { .. } => 4,
             }] += 1.0;
         }
         partial.extend(counts);
     }
-    let sum: Vec<u64> = space.sum(&partial, 5).into_iter().map(|n| n as u64).collect();
+    let sum: Vec<u64> = space.sum(&partial, 6).into_iter().map(|n| n as u64).collect();
     Sizes {
         nodes: bodies.iter().map(|b| b.counts().nodes).sum(),
         cells: bodies.iter().map(|b| b.counts().cells).sum(),
@@ -40,12 +41,13 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
         subdomains: decomposition.shares.total() as u64,
         clusters: clusters.count(clusters.levels().min(1)) as u64,
         coarse_blocks: clusters.total() as u64,
-        contact_subdomains: sum[4],
+        contact_subdomains: sum[5],
         primal_dofs: sum[0],
         gluing_rows: sum[1],
         dirichlet_rows: sum[2],
         contact_rows: sum[3],
-        dual_dofs: sum[1] + sum[2] + sum[3],
+        friction_rows: sum[4],
+        dual_dofs: sum[1] + sum[2] + sum[3] + sum[4],
         estimated: Vec::new(),
     }
 }

@@ -33,7 +33,10 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
     );
     let (from, to) = ((&coarse.bodies[..], &coarse.contacts.pairs), (&fine.bodies[..], &fine.contacts.pairs));
     let closed = closed_contacts(comm, from, &solved.closed, to);
-    let kept = |kind| if let Kind::Contact { pair } = kind { closed.contains(&pair) } else { true };
+    let kept = |kind| match kind {
+        Kind::Contact { pair } | Kind::Friction { pair, .. } => closed.contains(&pair),
+        Kind::Gluing | Kind::Support { .. } => true,
+    };
     newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect(), reach: None }
 }
 

@@ -11,6 +11,7 @@ use crate::constraint::law::Status;
 use crate::contact::MasterNode;
 use crate::decomposition::Subdomain;
 use crate::model::contacts::Contacts;
+use crate::newton::friction::Rubbing;
 use crate::results::piece::Field;
 
 /// Contact at one pair.
@@ -22,8 +23,10 @@ pub struct ContactState {
     pub force: f64,
     /// Distance along the normal (length); negative is penetration.
     pub gap: f64,
-    /// Whether the surfaces touch.
+    /// Whether the surfaces touch, and slip.
     pub status: Status,
+    /// Friction, if there is any.
+    pub friction: Option<Rubbing>,
 }
 
 /// Contact at the nodes of a rank's subdomains.
@@ -44,11 +47,19 @@ pub fn fields(subdomains: &[Subdomain], touching: &Contacts, states: &[ContactSt
         parts.fold(AtNodes::nothing(0), AtNodes::and)
     };
     let AtNodes { pressure, gap, status } = of(&|_| true);
+    let rubs = states.iter().any(|state| state.friction.is_some()) || touching.has_friction;
     let mut fields = vec![
         Field::scalar("contact_pressure", pressure),
         Field::scalar("contact_gap", gap),
         Field::integer("contact_status", status),
     ];
+    if rubs {
+        let [traction, slip]: [Vec<[f64; 3]>; 2] = std::array::from_fn(|which| {
+            subdomains.iter().flat_map(|subdomain| known.vectors(subdomain, which)).collect()
+        });
+        fields.push(Field::vector("friction_traction", &traction));
+        fields.push(Field::vector("slip", &slip));
+    }
     for &contact in &touching.sharing {
         let pressure = of(&|of| of == contact).pressure;
         // Names in HDF5 have no slash.
@@ -68,11 +79,18 @@ struct Known<'a> {
     masters: Vec<&'a MasterNode>,
     /// Pressure of each condition whose row is on this rank.
     pressures: HashMap<usize, f64>,
+    /// Friction stress on the slave's side of each condition whose row is on this rank, and what it slid on the other.
+    rubbed: HashMap<usize, [[f64; 3]; 2]>,
 }
 
 impl<'a> Known<'a> {
     fn new(Contacts { pairs, masters, .. }: &'a Contacts, states: &'a [ContactState]) -> Self {
         let pressures = states.iter().map(|state| (state.pair, state.force / pairs[state.pair].area)).collect();
+        let rubbed = states.iter().filter_map(|state| {
+            let Rubbing { force, total, .. } = state.friction?;
+            Some((state.pair, [force.map(|f| f / pairs[state.pair].area), total]))
+        });
+        let rubbed = rubbed.collect();
         let covered = states.iter().filter(|state| pairs[state.pair].covered);
         let mut slaves: Vec<_> =
             covered.map(|state| (pairs[state.pair].slave, pairs[state.pair].contact, state)).collect();
@@ -83,12 +101,31 @@ impl<'a> Known<'a> {
         let mut nodes: Vec<u64> = nodes.collect();
         nodes.sort_unstable();
         nodes.dedup();
-        Self { nodes, slaves, masters, pressures }
+        Self { nodes, slaves, masters, pressures, rubbed }
     }
 
     /// Pressure of a condition; zero where its row is on other ranks.
     fn pressure(&self, pair: usize) -> f64 {
         self.pressures.get(&pair).copied().unwrap_or_default()
+    }
+
+    /// Friction stress (0) or slip (1) at the nodes of a subdomain; on the master's side the mean of the conditions opposite, the other
+    /// way. Nodes of several contacts show sums.
+    fn vectors(&self, subdomain: &Subdomain, which: usize) -> Vec<[f64; 3]> {
+        let mut found = vec![[0.0; 3]; subdomain.nodes.len()];
+        let mut add = |local: usize, factor: f64, pair: usize| {
+            let Some(of) = self.rubbed.get(&pair).map(|of| of[which]) else { return };
+            found[local].iter_mut().zip(of).for_each(|(sum, x)| *sum += factor * x);
+        };
+        for (local, &node) in subdomain.nodes.iter().enumerate() {
+            let slaves = &self.slaves[self.slaves.partition_point(|(known, ..)| *known < node)..];
+            let slaves = slaves.iter().take_while(|(known, ..)| *known == node);
+            slaves.for_each(|(.., state)| add(local, 1.0, state.pair));
+            let masters = &self.masters[self.masters.partition_point(|master| master.node < node)..];
+            let masters = masters.iter().take_while(|master| master.node == node);
+            masters.flat_map(|master| &master.pairs).for_each(|&(pair, weight)| add(local, -weight, pair));
+        }
+        found
     }
 
     /// Contact at the nodes of a subdomain, of the contacts that are wanted.

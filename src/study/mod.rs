@@ -163,7 +163,7 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
         Begin::Around(mut u, limit) => {
             problem.make_admissible(&mut u);
             let largest = problem.space.maximum(newton::residuals::largest_displacement(&u));
-            let kept = problem.constraints.laws().kept_at(&problem.slack(&u), ROUNDING * largest);
+            let kept = problem.laws().kept_at(&problem.slack(&u), ROUNDING * largest);
             // Flowing bodies hardly resist what interpolation leaves open, and contacts part: those are found again from rest.
             if limit.is_some() && problem.constraints.has_inequalities {
                 u = problem.gather.zeros();
@@ -174,8 +174,9 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
         }
         Begin::After(Earlier { committed, u }) => {
             let closed = ROUNDING * committed.sizes.displacement;
-            let kept = problem.constraints.laws().kept_at(&problem.slack(&u), closed);
+            let kept = problem.laws().kept_at(&problem.slack(&u), closed);
             problem.committed = committed;
+            problem.commit_slips(&problem.slack(&u));
             newton::Begin::Near(newton::Start { u, kept, reach: None })
         }
         Begin::At(standing) => {

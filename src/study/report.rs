@@ -1,22 +1,24 @@
 //! What is told of a solution: rows of the log, contact states, the summary.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::contact::ContactState;
 use super::limits;
 use crate::comm::Comm;
 use crate::constraint::Kind;
+use crate::constraint::law::Status;
 use crate::model::contacts::Contacts;
 use crate::model::discrete::Discrete;
 use crate::model::held::load_step;
 use crate::newton::balance::BodyBalance;
+use crate::newton::friction::Rubbing;
 use crate::newton::path::At;
 use crate::newton::{self, Iterate, Newton, StepRecord, TornProblem};
 use crate::record::counts::{ContactRow, Counters};
 use crate::record::rows::{LimitLoad, NewtonRow, StepRow};
-use crate::record::state::{Acting, Errors, Measures, Residuals, State};
+use crate::record::state::{Acting, Errors, Measures, Residuals, Rubbed, State};
 use crate::record::summary::Summary;
-use crate::scene::{self, Scene};
+use crate::scene::{self, Friction, Scene};
 use crate::sizing::sizes::sizes;
 
 /// Where in the history an attempt leads, in words; nothing where all acts at once.
@@ -110,13 +112,66 @@ pub(super) fn convergence(rows: &[NewtonRow]) -> Vec<(String, Vec<f64>)> {
 /// Contact of every pair whose row is on this rank.
 pub(super) fn contact_states(problem: &TornProblem, Iterate { u, lambda, .. }: &Iterate) -> Vec<ContactState> {
     let slack = problem.slack(u);
+    let size = problem.space.maximum(newton::residuals::largest_displacement(u));
+    let rubbing = problem.rubbing(&slack, lambda).into_iter();
+    let rubbing: HashMap<usize, Rubbing> = rubbing.map(|rubbing| (rubbing.pair, rubbing)).collect();
     let rows = problem.constraints.rows.iter().zip(&slack).zip(lambda);
     rows.filter_map(|((row, slack), lambda)| {
         let Kind::Contact { pair } = row.kind else { return None };
-        let force = row.scale * lambda;
-        Some(ContactState { pair, force, gap: slack / row.scale, status: row.law().status(force) })
+        let (force, friction) = (row.scale * lambda, rubbing.get(&pair).copied());
+        let status = match (row.law().status(force), friction) {
+            (Status::Closed, Some(rubbing)) if rubbing.limit > 0.0 => rubbing.status(size),
+            (status, _) => status,
+        };
+        Some(ContactState { pair, force, gap: slack / row.scale, status, friction })
     })
     .collect()
+}
+
+/// Friction at each contact that has any. Collective.
+fn friction(
+    scene: &Scene,
+    problem: &TornProblem,
+    discrete: &Discrete,
+    (contact, size): (&[ContactState], f64),
+) -> BTreeMap<String, Rubbed> {
+    let Contacts { names, pairs, .. } = &discrete.contacts;
+    if !problem.constraints.has_friction {
+        return BTreeMap::new();
+    }
+    let signs = signs(scene, discrete);
+    let of_pair: HashMap<usize, Rubbing> =
+        contact.iter().filter_map(|state| Some((state.pair, state.friction?))).collect();
+    let pressed: HashMap<usize, f64> = contact.iter().map(|state| (state.pair, state.force)).collect();
+    let mut partial = Vec::new();
+    for rows in problem.space.owned() {
+        let mut sums = vec![[0.0; 6]; names.len()];
+        for row in rows.clone() {
+            let Kind::Contact { pair } = problem.constraints.rows[row].kind else { continue };
+            let Some(rubbing) = of_pair.get(&pair) else { continue };
+            let acts = rubbing.limit > 0.0 && (rubbing.is_given || pressed[&pair] > 0.0);
+            let slips = acts && rubbing.status(size) == Status::Slip;
+            let sum = &mut sums[pairs[pair].contact];
+            let sign = signs[pairs[pair].contact];
+            sum.iter_mut().zip(rubbing.force).for_each(|(sum, f)| *sum += sign * f);
+            sum[3] += rubbing.dissipation();
+            sum[4] += f64::from(acts && !slips);
+            sum[5] += f64::from(slips);
+        }
+        partial.extend_from_slice(sums.as_flattened());
+    }
+    let sums = problem.space.sum(&partial, 6 * names.len());
+    let of_contact = |&[x, y, z, dissipation, sticking, slipping]: &[f64; 6]| Rubbed {
+        force: [x, y, z],
+        dissipation,
+        sticking: sticking as u64,
+        slipping: slipping as u64,
+    };
+    let rubbed = sums.as_chunks::<6>().0.iter().map(of_contact);
+    let all = scene.contact.iter().zip(rubbed);
+    all.filter(|((_, contact), _)| contact.friction.is_some())
+        .map(|((name, _), rubbed)| (name.clone(), rubbed))
+        .collect()
 }
 
 /// The numbers of a run; what belongs to the whole run (times, scene name, ranks) is filled in by the caller.
@@ -180,6 +235,10 @@ fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[Contact
     let contact_forces = contact_forces(scene, problem, discrete, contact);
     let names = discrete.supports.iter().map(|s| s.name.clone());
     let maximum = |x: f64| problem.space.maximum(x);
+    let largest = maximum(newton::residuals::largest_displacement(u));
+    let friction = friction(scene, problem, discrete, (contact, largest));
+    let given = scene.contact.iter().filter(|(_, contact)| matches!(contact.friction, Some(Friction::Tresca(_))));
+    let given = given.filter_map(|(name, _)| friction.get(name)).map(|rubbed| rubbed.dissipation).sum::<f64>();
     State {
         plastic_elements: Some(state.plastic as u64),
         active_contacts: Some(problem.active_contacts(lambda) as u64),
@@ -187,17 +246,19 @@ fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[Contact
             contact_forces.iter().fold(0.0, |sum, force| sum + force[axis])
         })),
         contact_forces: discrete.contacts.names.iter().cloned().zip(contact_forces).collect(),
+        friction,
         reactions: names.zip(reactions).collect(),
         external_work: Some(state.external_work),
         internal_energy: Some(state.internal_energy),
-        energy: Some(state.energy),
-        max_displacement: Some(maximum(newton::residuals::largest_displacement(u))),
+        energy: Some(if given == 0.0 { state.energy } else { state.energy + given }),
+        max_displacement: Some(largest),
         max_von_mises: Some(maximum(von_mises)),
         residuals: Residuals {
             equilibrium: Some(residuals.equilibrium),
             gluing: Some(residuals.gluing),
             gap: Some(residuals.gap),
             complementarity: Some(residuals.complementarity),
+            friction: Some(residuals.friction),
             balance: Some(residual_balance),
         },
         balance: scene.body.keys().cloned().zip(balance.iter().map(acting)).collect(),
@@ -258,15 +319,25 @@ fn contact_forces(
     discrete: &Discrete,
     contact: &[ContactState],
 ) -> Vec<[f64; 3]> {
-    let (Contacts { names, pairs, .. }, signs) = (&discrete.contacts, signs(scene, discrete));
-    let of_pair: HashMap<usize, f64> = contact.iter().map(|state| (state.pair, state.force)).collect();
+    let Contacts { names, pairs, .. } = &discrete.contacts;
+    let signs = signs(scene, discrete);
+    let of_pair: HashMap<usize, [f64; 3]> = contact
+        .iter()
+        .map(|state| {
+            let mut force = pairs[state.pair].force(state.force);
+            if let Some(rubbing) = &state.friction {
+                force.iter_mut().zip(rubbing.force).for_each(|(sum, f)| *sum += f);
+            }
+            (state.pair, force)
+        })
+        .collect();
     let mut partial = Vec::new();
     for rows in problem.space.owned() {
         let mut sums = vec![[0.0; 3]; names.len()];
         for row in rows.clone() {
             if let Kind::Contact { pair } = problem.constraints.rows[row].kind {
                 let contact = pairs[pair].contact;
-                let force = pairs[pair].force(of_pair.get(&pair).copied().unwrap_or_default());
+                let force = of_pair.get(&pair).copied().unwrap_or_default();
                 sums[contact].iter_mut().zip(force).for_each(|(sum, f)| *sum += signs[contact] * f);
             }
         }

@@ -6,6 +6,7 @@
 
 mod blocks;
 mod cylinders;
+mod friction;
 mod hertz;
 mod homogeneous;
 mod limits;
@@ -67,6 +68,7 @@ pub fn cases() -> Vec<&'static dyn Case> {
     let mut cases: Vec<&'static dyn Case> = Vec::new();
     cases.extend(homogeneous::CASES.iter().map(|case| case as &dyn Case));
     cases.extend(blocks::CASES.iter().map(|case| case as &dyn Case));
+    cases.extend(friction::BLOCKS.iter().map(|case| case as &dyn Case));
     cases.extend(manufactured::CASES.iter().map(|case| case as &dyn Case));
     cases.extend(spheres::HOLLOW.iter().map(|case| case as &dyn Case));
     cases.push(&spheres::Nested);

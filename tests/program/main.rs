@@ -12,6 +12,7 @@ mod edges;
 mod elements;
 mod faults;
 mod files;
+mod friction;
 mod fuzz;
 mod gmsh;
 mod hard;

@@ -6,6 +6,7 @@
 
 use super::bodies::BodyMotions;
 use super::factor::{Blocks, CoarseFactor};
+use super::sliding::Sliding;
 use super::{Coarse, Floating};
 use crate::comm::Comm;
 use crate::feti::inverse::kernel::MODES;
@@ -14,6 +15,8 @@ use crate::feti::inverse::kernel::MODES;
 pub(super) struct Base {
     /// For each row whether it is in the base, equalities being in each; empty if no contact is.
     contacts: Vec<bool>,
+    /// What is kept of pairs of these rows.
+    sliding: Sliding,
     factor: CoarseFactor,
     /// `N`, six numbers a cluster.
     free: Vec<Vec<f64>>,
@@ -25,17 +28,20 @@ impl Base {
     /// # Errors
     /// As [`Base::new`].
     pub fn of_equalities(coarse: &Coarse) -> Result<Self, Floating> {
-        Self::new(coarse, &[])
+        Self::new(coarse, &[], &Sliding::default())
     }
 
     /// Of the equalities and the kept contacts. Collective.
     ///
     /// # Errors
     /// If these rows leave a motion free that is not one of whole bodies: on every rank.
-    pub fn new(coarse: &Coarse, kept: &[bool]) -> Result<Self, Floating> {
-        let is_kept = |row: usize| kept.get(row).is_some_and(|kept| *kept);
-        let blocks = || coarse.blocks(is_kept);
-        let unit = || coarse.unit_blocks(is_kept);
+    pub fn new(coarse: &Coarse, kept: &[bool], sliding: &Sliding) -> Result<Self, Floating> {
+        let weight = |row: usize| match kept.get(row) {
+            Some(true) => sliding.weight(row),
+            _ => 0.0.into(),
+        };
+        let blocks = || coarse.blocks(weight);
+        let unit = || coarse.unit_blocks(weight);
         let found = coarse.factor_of(&blocks(), unit).map(|factor| (factor, Vec::new())).or_else(|floating| {
             let motions = coarse.motions();
             let free: Vec<Vec<f64>> = motions.free(&unit()).iter().map(|motion| motions.amplitudes(motion)).collect();
@@ -46,12 +52,19 @@ impl Base {
             let factor = coarse.factor_of(&tied(blocks()), || tied(unit()))?;
             Ok((factor, free))
         });
-        found.map(|(factor, free)| Self { contacts: kept.to_vec(), factor, free })
+        found.map(|(factor, free)| Self { contacts: kept.to_vec(), sliding: sliding.clone(), factor, free })
     }
 
     /// Whether a contact is in the base.
     pub fn has_contact(&self, row: usize) -> bool {
         self.contacts.get(row).is_some_and(|has| *has)
+    }
+
+    /// Whether it has nothing that these rows lack.
+    pub fn is_part_of(&self, kept: &[bool], sliding: &Sliding) -> bool {
+        let fits =
+            |(row, kept): (usize, &bool)| !self.has_contact(row) || *kept && self.sliding.of(row) == sliding.of(row);
+        kept.iter().enumerate().all(fits)
     }
 
     /// Rigid motions of whole bodies that the base leaves free, six numbers a cluster.

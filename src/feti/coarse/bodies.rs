@@ -234,7 +234,7 @@ mod tests {
                     let force = coarse.force_on_bodies(row);
                     match of.kind {
                         Kind::Gluing => assert!(force.iter().all(|f| f.abs() < 1e-13), "{force:?}"),
-                        Kind::Contact { .. } => {
+                        Kind::Contact { .. } | Kind::Friction { .. } => {
                             (0..3).for_each(|a| assert!((force[a] + force[MODES + a]).abs() < 1e-13));
                             assert!(force[2].abs() > 0.1);
                         }

@@ -23,6 +23,7 @@ use faer::{ColRef, Mat};
 use super::Coarse;
 use super::base::Base;
 use super::factor::{Block, Blocks};
+use super::sliding::Sliding;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
 use crate::span::complement;
@@ -35,6 +36,8 @@ const FEW: usize = 1000;
 /// The kept rows.
 pub struct CoarseFace {
     kept: Vec<bool>,
+    /// Of which of them only a combination is.
+    sliding: Sliding,
     /// Rows that are not.
     dropped: Vec<u32>,
     base: Rc<Base>,
@@ -57,37 +60,45 @@ struct Held {
 impl CoarseFace {
     /// Of the rows that are kept, all equalities among them; all are in the base. Collective.
     pub fn new(coarse: &Coarse, kept: Vec<bool>) -> Self {
+        Self::sliding(coarse, kept, Sliding::default())
+    }
+
+    /// The same, where of some pairs of rows only a combination is kept. Collective.
+    pub fn sliding(coarse: &Coarse, kept: Vec<bool>, sliding: Sliding) -> Self {
         let base = match coarse.has_contacts(&kept) {
             // Parts of a body may hang on equalities and contacts that the base as a whole does not hold.
-            true => Base::new(coarse, &kept).map_or_else(|_| Rc::clone(coarse.base()), Rc::new),
+            true => Base::new(coarse, &kept, &sliding).map_or_else(|_| Rc::clone(coarse.base()), Rc::new),
             false => Rc::clone(coarse.base()),
         };
-        Self::on(coarse, base, kept)
+        Self::on(coarse, base, kept, sliding)
     }
 
     /// Of the rows that are kept, only the equalities being in the base. Collective.
     pub fn loose(coarse: &Coarse, kept: Vec<bool>) -> Self {
-        Self::on(coarse, Rc::clone(coarse.base()), kept)
+        Self::on(coarse, Rc::clone(coarse.base()), kept, Sliding::default())
     }
 
     /// Of other rows, for a short while: on the base that is there, or, if that has lost a row, on that of the equalities. Collective.
-    pub fn with(&self, coarse: &Coarse, space: &RowSpace, kept: Vec<bool>) -> Self {
+    pub fn with(&self, coarse: &Coarse, space: &RowSpace, kept: Vec<bool>, sliding: Sliding) -> Self {
         if coarse.clusters() <= FEW {
-            return Self::new(coarse, kept);
+            return Self::sliding(coarse, kept, sliding);
         }
-        let is_lost = |(row, kept): (usize, &bool)| self.base.has_contact(row) && !kept;
-        let lost = kept.iter().enumerate().any(is_lost);
+        let lost = !self.base.is_part_of(&kept, &sliding);
         let base = if space.maximum(f64::from(lost)) > 0.0 { coarse.base() } else { &self.base };
-        Self::on(coarse, Rc::clone(base), kept)
+        Self::on(coarse, Rc::clone(base), kept, sliding)
     }
 
     /// Of the same rows, all in the base. Collective.
     pub fn settled(self, coarse: &Coarse) -> Self {
-        if self.contacts.is_empty() { self } else { Self::new(coarse, self.kept) }
+        if self.contacts.is_empty() { self } else { Self::sliding(coarse, self.kept, self.sliding) }
     }
 
-    fn on(coarse: &Coarse, base: Rc<Base>, kept: Vec<bool>) -> Self {
-        let [contacts, unit] = coarse.contact_blocks(|row| kept[row] && !base.has_contact(row));
+    fn on(coarse: &Coarse, base: Rc<Base>, kept: Vec<bool>, sliding: Sliding) -> Self {
+        let weight = |row: usize| match kept[row] && !base.has_contact(row) {
+            true => sliding.weight(row),
+            false => 0.0.into(),
+        };
+        let [contacts, unit] = coarse.contact_blocks(weight);
         let (held, free) = match base.free() {
             [] => (None, Vec::new()),
             motions => {
@@ -96,7 +107,7 @@ impl CoarseFace {
             }
         };
         let dropped = (0..).zip(&kept).filter(|(_, kept)| !**kept).map(|(row, _)| row).collect();
-        Self { kept, dropped, base, contacts, held, free }
+        Self { kept, sliding, dropped, base, contacts, held, free }
     }
 
     /// Rigid motions of whole bodies that the kept rows leave free, six numbers a cluster.
@@ -117,9 +128,15 @@ impl CoarseFace {
         &self.kept
     }
 
+    /// Of which pairs of them only a combination is kept.
+    pub fn slides(&self) -> &Sliding {
+        &self.sliding
+    }
+
     /// Sets the other rows to zero.
     pub fn mask(&self, rows: &mut [f64]) {
         self.dropped.iter().for_each(|&row| rows[row as usize] = 0.0);
+        self.sliding.mask(rows);
     }
 
     /// `rows = P rows`. One all-gather.
@@ -175,7 +192,18 @@ impl CoarseFace {
     }
 
     /// `rows -= L e`. Collective.
-    fn subtract_balance(&self, coarse: &Coarse, mut e: Vec<f64>, rows: &mut [f64]) {
+    fn subtract_balance(&self, coarse: &Coarse, e: Vec<f64>, rows: &mut [f64]) {
+        if self.sliding.is_empty() && self.held.is_none() {
+            return self.subtract_unmasked(coarse, e, rows);
+        }
+        // Other rows keep what they have.
+        let mut balance = vec![0.0; rows.len()];
+        self.subtract_unmasked(coarse, e, &mut balance);
+        self.mask(&mut balance);
+        rows.iter_mut().zip(balance).for_each(|(row, balance)| *row += balance);
+    }
+
+    fn subtract_unmasked(&self, coarse: &Coarse, mut e: Vec<f64>, rows: &mut [f64]) {
         if let Some(held) = &self.held {
             let motions = self.base.free();
             let shares = held.solve(&products(motions, &e));

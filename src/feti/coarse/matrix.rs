@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use super::factor::Block;
+use super::sliding::Weight;
 use crate::constraint::{Constraints, Kind, Row};
 use crate::decomposition::{Clusters, Subdomain};
 use crate::feti::dual::gather::Gather;
@@ -170,20 +171,18 @@ impl Matrix {
         work::each(slots, 2 * MODES, size_of::<[f64; MODES]>() + size_of::<u32>());
     }
 
-    /// Blocks of `G W G'` of some rows with the diagonal `W`: for each own subdomain its cluster, and what it adds to the lower blocks
+    /// Blocks of `G W G'` of some rows with these weights `W`: for each own subdomain its cluster, and what it adds to the lower blocks
     /// of that line, by column. Complete: every row that a subdomain takes part in is on its rank.
-    pub fn products(&self, rows: Rows, weight: impl Fn(usize) -> f64) -> Vec<(usize, Vec<(usize, Block)>)> {
+    pub fn products(&self, rows: Rows, weight: impl Fn(usize) -> Weight) -> Vec<(usize, Vec<(usize, Block)>)> {
         let mut result = Vec::new();
         for (&cluster, acting) in self.clusters.iter().zip(&self.acting[rows as usize]) {
             // A cluster has few neighbours.
             let (mut columns, mut blocks): (Vec<u32>, Vec<Block>) = Default::default();
             for Acting { row, modes } in acting {
-                let weight = weight(*row as usize);
-                if weight == 0.0 {
-                    continue;
-                }
-                let modes = modes.map(|g| weight * g);
-                for other in self.slots(*row as usize) {
+                let Weight { own, other } = weight(*row as usize);
+                let both = [(*row as usize, own)].into_iter().chain(other).filter(|(_, weight)| *weight != 0.0);
+                for (other, weight) in both.flat_map(|(of, weight)| self.slots(of).map(move |slot| (slot, weight))) {
+                    let modes = modes.map(|g| weight * g);
                     let column = self.cluster[other];
                     if column as usize > cluster {
                         continue;

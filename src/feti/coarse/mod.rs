@@ -1,7 +1,7 @@
 //! The coarse problem `G G' a = r` with `G = R'B'`, and what follows from it.
 //!
 //! [`matrix`] is `G`, [`problem`] what ranks make of it together. [`base`] has the [`factor`] of the equalities, on which [`face`], the
-//! coarse problem of the rows that hold, is built; [`projector`] is `P = I - G'(G G')^-1 G` of all rows. [`recover`] has `e = R'f` and `R alpha`, [`motion`] the `alpha` of a solution. [`bodies`] are
+//! coarse problem of the rows that hold, is built; [`projector`] is `P = I - G'(G G')^-1 G` of all rows. [`recover`] has `e = R'f` and `R alpha`, [`motion`] the `alpha` of a solution. Of rows along which surfaces slide [`sliding`] has what is kept. [`bodies`] are
 //! motions of whole bodies, and [`equilibrium`] tells whether anything holds these.
 
 mod base;
@@ -14,6 +14,7 @@ pub mod motion;
 pub mod problem;
 pub mod projector;
 pub mod recover;
+pub mod sliding;
 
 pub use problem::{Coarse, Floating};
 

@@ -14,6 +14,7 @@ use super::bodies::BodyMotions;
 use super::face::CoarseFace;
 use super::factor::{Block, Blocks, CoarseAnalysis, CoarseFactor};
 use super::matrix::{Matrix, Rows};
+use super::sliding::Weight;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::Constraints;
 use crate::decomposition::{Clusters, Decomposition};
@@ -109,7 +110,8 @@ impl<'a> Coarse<'a> {
     /// If they are singular: on every rank.
     pub(super) fn factor_of(&self, blocks: &Blocks, unit: impl FnOnce() -> Blocks) -> Result<CoarseFactor, Floating> {
         let clusters = self.clusters.total();
-        let analysis = self.symbolic.get_or_init(|| Rc::new(CoarseAnalysis::new(&self.blocks(|_| true), clusters)));
+        let analysis =
+            self.symbolic.get_or_init(|| Rc::new(CoarseAnalysis::new(&self.blocks(|_| 1.0.into()), clusters)));
         let fitting = if analysis.holds(blocks) { analysis } else { &Rc::new(CoarseAnalysis::new(blocks, clusters)) };
         let factor = CoarseFactor::new(self.comm, fitting, blocks);
         let sound = factor.and_then(|factor| {
@@ -120,24 +122,31 @@ impl<'a> Coarse<'a> {
         sound.map_err(|cluster| self.floating(cluster))
     }
 
-    /// Blocks of `G G'` of the equalities and the kept contacts, those of all ranks on every rank; lower triangle. Collective.
-    pub(super) fn blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
-        let mut blocks = self.equalities.get_or_init(|| self.products(Rows::Equalities, |_| 1.0)).clone();
-        add(&mut blocks, self.products(Rows::Inequalities, |row| f64::from(kept(row))));
+    /// Blocks of `G W G'` of the equalities and the contacts with these weights `W`, those of all ranks on every rank; lower
+    /// triangle. Collective.
+    pub(super) fn blocks(&self, weight: impl Fn(usize) -> Weight) -> Blocks {
+        let mut blocks = self.equalities.get_or_init(|| self.products(Rows::Equalities, |_| 1.0.into())).clone();
+        add(&mut blocks, self.products(Rows::Inequalities, weight));
         blocks
     }
 
     /// As [`Coarse::blocks`], were all rows unit vectors. Collective.
-    pub(super) fn unit_blocks(&self, kept: impl Fn(usize) -> bool) -> Blocks {
-        let mut blocks = self.products(Rows::Equalities, |row| self.unit[row]);
-        add(&mut blocks, self.products(Rows::Inequalities, |row| if kept(row) { self.unit[row] } else { 0.0 }));
+    pub(super) fn unit_blocks(&self, weight: impl Fn(usize) -> Weight) -> Blocks {
+        let mut blocks = self.products(Rows::Equalities, |row| self.unit[row].into());
+        add(&mut blocks, self.products(Rows::Inequalities, |row| self.as_unit(row, weight(row))));
         blocks
     }
 
-    /// Blocks of `G G'` of the kept contacts alone, and those if these rows were unit vectors. Collective.
-    pub(super) fn contact_blocks(&self, kept: impl Fn(usize) -> bool) -> [Blocks; 2] {
-        let unit = self.products(Rows::Inequalities, |row| if kept(row) { self.unit[row] } else { 0.0 });
-        [self.products(Rows::Inequalities, |row| f64::from(kept(row))), unit]
+    /// Blocks of `G W G'` of the contacts alone, and those if these rows were unit vectors. Collective.
+    pub(super) fn contact_blocks(&self, weight: impl Fn(usize) -> Weight) -> [Blocks; 2] {
+        let unit = self.products(Rows::Inequalities, |row| self.as_unit(row, weight(row)));
+        [self.products(Rows::Inequalities, weight), unit]
+    }
+
+    /// The weight of a row, were it a unit vector.
+    fn as_unit(&self, row: usize, Weight { own, other }: Weight) -> Weight {
+        let beside = |(other, weight): (usize, f64)| (other, weight * (self.unit[row] * self.unit[other]).sqrt());
+        Weight { own: own * self.unit[row], other: other.map(beside) }
     }
 
     /// Solves with the factor of the equalities, in place: six numbers a cluster, equal on all ranks. Collective.
@@ -158,7 +167,7 @@ impl<'a> Coarse<'a> {
 
     /// Whether any contact, on any rank, is among the kept rows. Collective.
     pub(super) fn has_contacts(&self, kept: &[bool]) -> bool {
-        !self.products(Rows::Inequalities, |row| f64::from(kept[row])).is_empty()
+        !self.products(Rows::Inequalities, |row| f64::from(kept[row]).into()).is_empty()
     }
 
     /// Number of clusters.
@@ -170,7 +179,7 @@ impl<'a> Coarse<'a> {
         self.comm
     }
 
-    fn products(&self, rows: Rows, weight: impl Fn(usize) -> f64) -> Blocks {
+    fn products(&self, rows: Rows, weight: impl Fn(usize) -> Weight) -> Blocks {
         let mut of_clusters = Vec::new();
         for (row, blocks) in self.matrix.products(rows, weight) {
             of_clusters.extend(blocks.into_iter().map(|(column, block)| ((row, column), block)));
@@ -198,7 +207,7 @@ impl<'a> Coarse<'a> {
 
     /// Rigid motions of whole bodies, orthonormal, that equalities leave free. They do not depend on how long rows are. Collective.
     pub fn free(&self) -> Vec<Vec<f64>> {
-        self.motions.free(&self.unit_blocks(|_| false))
+        self.motions.free(&self.unit_blocks(|_| 0.0.into()))
     }
 
     /// `G' motion` of all rows, of six numbers a cluster. Local.

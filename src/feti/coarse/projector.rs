@@ -20,7 +20,7 @@ impl<'a> Coarse<'a> {
         let factor = match self.whole.get() {
             Some(factor) => factor,
             None => {
-                let factor = self.factor_of(&self.blocks(|_| true), || self.unit_blocks(|_| true))?;
+                let factor = self.factor_of(&self.blocks(|_| 1.0.into()), || self.unit_blocks(|_| 1.0.into()))?;
                 self.whole.get_or_init(|| factor)
             }
         };

@@ -62,6 +62,16 @@ impl Flexibility {
         result
     }
 
+    /// How far a unit multiplier of a row moves its own displacement, if nothing but its nodes moves (length over force, in the
+    /// units of the row).
+    pub fn of_row(&self, constraints: &Constraints, row: usize) -> f64 {
+        let slots = constraints.slots(row).zip(constraints.rows[row].terms.chunk_by(Term::share_slot));
+        let of_slot = |(slot, part): (usize, &[Term])| -> f64 {
+            part.iter().map(|term| term.value * term.value * self.of_slot[slot][term.axis]).sum()
+        };
+        slots.map(of_slot).sum()
+    }
+
     /// Brings the flexibility of its node to each slot.
     fn exchange(&mut self, constraints: &Constraints, gather: &Gather, tied: &[Vec<Tied>]) {
         let slots = constraints.slot_subdomain.len();

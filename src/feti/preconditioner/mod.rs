@@ -6,6 +6,7 @@ pub mod flexibility;
 pub mod scaling;
 
 use self::deluxe::Deluxe;
+use self::flexibility::Flexibility;
 use self::scaling::Scaling;
 use super::Torn;
 use super::dual::Interconnection;
@@ -96,6 +97,11 @@ impl<'a> Preconditioner<'a> {
         Ok(())
     }
 
+    /// Flexibility of the nodes, at the tangents of the last update.
+    pub fn flexibility(&self) -> &Flexibility {
+        self.scaling.flexibility()
+    }
+
     /// From now on scales the kept rows only: all equalities and some inequalities. Local.
     pub fn restrict(&mut self, constraints: &Constraints, kept: impl Fn(usize) -> bool) {
         self.scaling.restrict(constraints, kept);
@@ -128,7 +134,7 @@ impl<'a> Preconditioner<'a> {
         let mut defect = vec![0.0; slack.len()];
         self.gather.apply(u, &mut defect);
         defect.iter_mut().zip(slack).for_each(|(d, s)| *d = s - *d);
-        constraints.laws().violation(&mut defect);
+        constraints.violation(&mut defect);
         timer.time("scaling", || self.restrict(constraints, |row| kept[row] || defect[row] != 0.0));
         timer.time("preconditioner", || self.mend(&defect, u));
     }

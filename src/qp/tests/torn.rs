@@ -1,6 +1,7 @@
 //! For tests: the dual problem of a torn membrane with an obstacle, small and dense, but with all that Total-FETI has:
 //! floating parts, orthonormal gluing rows, support rows, contact rows, a coarse right-hand side.
 
+use super::super::slides::Slides;
 use super::dense::{Matrix, Plain, dot};
 use crate::qp::active_set::Face;
 use crate::qp::feasible::FeasibleSet;
@@ -159,7 +160,7 @@ impl Quadratic for Torn {
 }
 
 impl Face for Torn {
-    fn restrict(&mut self, kept: &mut [bool]) -> bool {
+    fn restrict(&mut self, kept: &mut [bool], _: &Slides) -> bool {
         self.kept = kept.to_vec();
         self.basis.clear();
         let mut possible = true;
@@ -197,7 +198,7 @@ impl Face for Torn {
 /// Solves by SMALSE-M with x = x0 + y, x0 the shortest solution of the equalities; returns x.
 pub fn homogenised(torn: &mut Torn, relative: f64) -> Solution {
     let n = torn.d.len();
-    torn.restrict(&mut vec![true; n]);
+    torn.restrict(&mut vec![true; n], &Slides::default());
     let mut shift = vec![0.0; n];
     torn.restore(&mut shift);
     let b: Vec<f64> = torn.f.times(&shift).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();

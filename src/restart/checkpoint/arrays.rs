@@ -101,25 +101,40 @@ impl<'a> Packer<'a> {
     fn rows(&self) -> Vec<Field> {
         let rows = &self.discrete.constraints.rows;
         let owned = || self.owned.iter().flat_map(Range::clone);
-        vec![
+        let slips = self.discrete.constraints.has_friction.then(|| owned().map(|row| self.slip(row)).collect());
+        let mut fields = vec![
             Field::integer("rows/node", owned().map(|row| lowest_node(&rows[row]) as i64).collect()),
             Field::integer("rows/kept", owned().map(|row| i64::from(self.is_kept(row))).collect()),
             Field::scalar("rows/multiplier", owned().map(|row| self.newton.lambda[row]).collect()),
             Field::scalar("rows/last", owned().map(|row| self.last_multiplier(row)).collect()),
-        ]
+        ];
+        fields.extend(slips.map(|slips| Field::scalar("rows/slip", slips)));
+        fields
+    }
+
+    /// What surfaces have slid in a row of friction.
+    fn slip(&self, row: usize) -> f64 {
+        self.newton.committed.slips.get(row).copied().unwrap_or_default()
     }
 
     fn contacts(&self) -> Vec<Field> {
         let rows = &self.discrete.constraints.rows;
         let owned = self.owned.iter().flat_map(Range::clone);
-        let contacts: Vec<(usize, [i64; 3])> =
+        let contacts: Vec<(usize, [i64; 4])> =
             owned.filter_map(|row| Some((row, contact(self.discrete, row)?))).collect();
         let force = |row: usize| rows[row].scale * self.last_multiplier(row);
-        vec![
-            Field::of("contacts/condition", 3, Values::Integer(contacts.iter().flat_map(|(_, key)| *key).collect())),
+        let slips = self
+            .discrete
+            .constraints
+            .has_friction
+            .then(|| contacts.iter().map(|(row, _)| self.slip(*row) / rows[*row].scale).collect());
+        let mut fields = vec![
+            Field::of("contacts/condition", 4, Values::Integer(contacts.iter().flat_map(|(_, key)| *key).collect())),
             Field::integer("contacts/kept", contacts.iter().map(|(row, _)| i64::from(self.is_kept(*row))).collect()),
             Field::scalar("contacts/last_force", contacts.iter().map(|(row, _)| force(*row)).collect()),
-        ]
+        ];
+        fields.extend(slips.map(|slips| Field::scalar("contacts/slip", slips)));
+        fields
     }
 
     /// Whether the multipliers of the iterate act on a row.

@@ -106,6 +106,8 @@ struct Arrays {
     reached_lambda: Vec<f64>,
     /// The rows that multipliers act on.
     kept: Vec<bool>,
+    /// What surfaces have slid in friction rows; empty without friction.
+    slips: Vec<f64>,
     flows: Vec<Flow>,
     bases: Vec<Bases>,
     histories: Vec<Vec<History>>,
@@ -149,11 +151,15 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
 }
 
 /// What tells a row of a contact from others, however bodies are cut: the number of the contact, the slave node, and the smooth
-/// part of the surface around it.
-fn contact(Discrete { constraints, contacts, .. }: &Discrete, row: usize) -> Option<[i64; 3]> {
-    let Kind::Contact { pair } = constraints.rows[row].kind else { return None };
+/// part of the surface around it; then 0 for the normal, or the number of the direction of friction, from 1.
+fn contact(Discrete { constraints, contacts, .. }: &Discrete, row: usize) -> Option<[i64; 4]> {
+    let (pair, direction) = match constraints.rows[row].kind {
+        Kind::Contact { pair } => (pair, 0),
+        Kind::Friction { pair, axis } => (pair, 1 + i64::from(axis)),
+        Kind::Gluing | Kind::Support { .. } => return None,
+    };
     let ContactPair { contact, slave, part, .. } = contacts.pairs[pair];
-    Some([contact as i64, slave as i64, i64::from(part)])
+    Some([contact as i64, slave as i64, i64::from(part), direction])
 }
 
 /// Lowest node of a row.
@@ -208,7 +214,7 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
     let reached = numbers.has_reached.then_some(Reached { u: arrays.reached_u, lambda: arrays.reached_lambda });
     let newton = Snapshot {
         attempt: numbers.attempt,
-        committed: Committed { histories: arrays.histories, sizes: numbers.sizes },
+        committed: Committed { histories: arrays.histories, sizes: numbers.sizes, slips: arrays.slips },
         reached,
         steps: numbers.steps,
         before: numbers.before,

@@ -34,7 +34,7 @@ pub(super) fn read(
     agree(comm, "the arrays", if whole { Ok(()) } else { Err("nodes or elements are missing") })?;
     let torn = |name: &str| places.at_nodes(arrays, &points, (name, 3, 0));
 
-    let of_contacts: HashMap<[i64; 3], usize> =
+    let of_contacts: HashMap<[i64; 4], usize> =
         (0..rows.len()).filter_map(|row| Some((contact(discrete, row)?, row))).collect();
     let contacts = Wanted::find(arrays, "contacts/condition", |key| of_contacts.get(&key).copied())?;
     let mut kept: Vec<bool> = rows.iter().map(|row| row.law().always_holds()).collect();
@@ -45,6 +45,13 @@ pub(super) fn read(
         (kept[row], reached_lambda[row]) = (state == 1, force / rows[row].scale);
     }
 
+    let mut slips = Vec::new();
+    if discrete.constraints.has_friction {
+        slips.resize(rows.len(), 0.0);
+        for ((_, row), slip) in contacts.rows().zip(contacts.read::<f64>(arrays, "contacts/slip", 0)?) {
+            slips[row] = slip * rows[row].scale;
+        }
+    }
     let [of_points, of_cells] = recorded;
     Ok(Arrays {
         u: torn("points/displacement")?,
@@ -52,6 +59,7 @@ pub(super) fn read(
         lambda: vec![0.0; rows.len()],
         reached_lambda,
         kept,
+        slips,
         flows: vec![Flow::default(); subdomains.len()],
         bases: vec![Bases::default(); subdomains.len()],
         histories: histories(discrete, file, &places, &cells)?,

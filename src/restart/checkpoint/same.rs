@@ -44,7 +44,7 @@ pub(super) fn read(
     let reader = Reader::new(comm, discrete, file)?;
     let Reader { points, cells, .. } = &reader;
     let torn = |name: &str| -> Result<Torn, String> { Ok(points.split(points.read(file, name, 0)?, 3)) };
-    let (of_rows, kept) = reader.rows()?;
+    let (of_rows, kept, slips) = reader.rows()?;
     let [of_points, of_cells] = recorded;
     Ok(Arrays {
         u: torn("points/displacement")?,
@@ -52,6 +52,7 @@ pub(super) fn read(
         lambda: of_rows.iter().map(|row| row[0]).collect(),
         reached_lambda: of_rows.iter().map(|row| row[1]).collect(),
         kept,
+        slips,
         flows: reader.flows("flow")?,
         bases: reader.bases(&torn)?,
         histories: reader.histories()?,
@@ -60,6 +61,9 @@ pub(super) fn read(
         cell_data: of_cells.read(|(name, _, k)| cells.read(file, name, k), |(name, _, k)| cells.read(file, name, k))?,
     })
 }
+
+/// Multipliers, whether rows are kept, and slips.
+type OfRows = (Vec<[f64; 2]>, Vec<bool>, Vec<f64>);
 
 /// Reads what belongs to own subdomains.
 struct Reader<'a> {
@@ -127,19 +131,23 @@ impl<'a> Reader<'a> {
         Ok(bases.map(|((factor, interior), drift)| Bases { factor, interior, drift }).collect())
     }
 
-    /// Multiplier and last multiplier of each row on this rank, and whether it is kept.
-    fn rows(&self) -> Result<(Vec<[f64; 2]>, Vec<bool>), Miss> {
+    /// Multiplier and last multiplier of each row on this rank, whether it is kept, and what surfaces have slid along it.
+    fn rows(&self) -> Result<OfRows, Miss> {
         let Self { comm, discrete, file, .. } = *self;
         let multiplier = self.rows.read::<f64>(file, "rows/multiplier", 0)?;
         let last = self.rows.read::<f64>(file, "rows/last", 0)?;
         let kept = self.rows.read::<i64>(file, "rows/kept", 0)?;
-        let mut of_rows = vec![[0; 3]; discrete.constraints.rows.len()];
-        let values = multiplier.into_iter().zip(last).zip(kept);
-        for (row, ((multiplier, last), kept)) in self.owned.iter().flat_map(Range::clone).zip(values) {
-            of_rows[row] = [multiplier.to_bits(), last.to_bits(), kept as u64];
+        let rubs = discrete.constraints.has_friction;
+        let slips = if rubs { self.rows.read::<f64>(file, "rows/slip", 0)? } else { vec![0.0; kept.len()] };
+        let mut of_rows = vec![[0; 4]; discrete.constraints.rows.len()];
+        let values = multiplier.into_iter().zip(last).zip(kept).zip(slips);
+        for (row, (((multiplier, last), kept), slip)) in self.owned.iter().flat_map(Range::clone).zip(values) {
+            of_rows[row] = [multiplier.to_bits(), last.to_bits(), kept as u64, slip.to_bits()];
         }
         complete(comm, discrete, &mut of_rows);
-        Ok(of_rows.iter().map(|row| ([row[0], row[1]].map(f64::from_bits), row[2] == 1)).unzip())
+        let slips = if rubs { of_rows.iter().map(|row| f64::from_bits(row[3])).collect() } else { Vec::new() };
+        let (multipliers, kept) = of_rows.iter().map(|row| ([row[0], row[1]].map(f64::from_bits), row[2] == 1)).unzip();
+        Ok((multipliers, kept, slips))
     }
 
     fn histories(&self) -> Result<Vec<Vec<History>>, Miss> {
@@ -195,7 +203,7 @@ impl Part {
 }
 
 /// Fills in what ranks know of rows that they hold but do not own, from those that do. Collective.
-fn complete(comm: &dyn Comm, discrete: &Discrete, rows: &mut [[u64; 3]]) {
+fn complete(comm: &dyn Comm, discrete: &Discrete, rows: &mut [[u64; 4]]) {
     let (constraints, shares) = (&discrete.constraints, &discrete.decomposition.shares);
     let blocks = constraints.blocks.iter().zip(&constraints.block_subdomains);
     let (mut own, mut foreign) = (HashMap::new(), vec![Vec::new(); comm.size()]);
@@ -213,6 +221,6 @@ fn complete(comm: &dyn Comm, discrete: &Discrete, rows: &mut [[u64; 3]]) {
     let answers: Vec<Vec<u64>> = comm.all_to_all(wishes).into_iter().map(answer).collect();
     for (blocks, answers) in foreign.into_iter().zip(comm.all_to_all(answers)) {
         let of_blocks = blocks.into_iter().flat_map(|(_, block)| block);
-        of_blocks.zip(answers.as_chunks::<3>().0).for_each(|(row, answer)| rows[row] = *answer);
+        of_blocks.zip(answers.as_chunks::<4>().0).for_each(|(row, answer)| rows[row] = *answer);
     }
 }

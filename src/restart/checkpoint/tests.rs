@@ -33,7 +33,7 @@ fn scene(sets: &[&str]) -> Scene {
 }
 
 /// Which contacts held, and with what force in the last increment, by what tells them apart; nothing where that is not known.
-type Contacts = BTreeMap<[i64; 3], (bool, f64)>;
+type Contacts = BTreeMap<[i64; 4], (bool, f64)>;
 
 fn contacts(discrete: &Discrete, standing: &Standing) -> Contacts {
     let newton = &standing.newton;

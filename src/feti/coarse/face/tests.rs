@@ -2,6 +2,7 @@ use faer::Mat;
 use faer::prelude::Solve;
 
 use super::*;
+
 use crate::fixture::{Setup, assert_close, column, on_ranks, same_on_any_ranks, two_bricks, two_bricks_by_metis};
 use crate::scene::Scene;
 
@@ -44,7 +45,7 @@ fn faces<'a>(setup: &'a Setup) -> Vec<(Coarse<'a>, CoarseFace)> {
     let grown = |coarse: Coarse<'a>| {
         let few = setup.rows().iter().map(|row| row.law().always_holds() || row.terms[0].node % 4 == 0).collect();
         let face = CoarseFace::new(&coarse, few);
-        let face = CoarseFace::on(&coarse, Rc::clone(&face.base), some(setup));
+        let face = CoarseFace::on(&coarse, Rc::clone(&face.base), some(setup), Sliding::default());
         (coarse, face)
     };
     let loose = |coarse: Coarse<'a>| {

@@ -1,0 +1,165 @@
+//! Friction rows: `t . (weighted means over the copies of the slave side's nodes - the master's) = slip`, for directions `t` in the
+//! plane of a contact pair.
+//!
+//! A pair with friction has two more rows of B, for orthonormal directions orthogonal to its normal. A direction that supports
+//! hold on all nodes of the pair has no row: what slides along it is prescribed, and friction along it acts on supports. Rows of
+//! one pair have one scale, so that a disc of forces is a disc of multipliers. Where a node has several conditions (edges,
+//! corners) only directions have rows that are independent of all its normals: others would be held twice.
+
+use super::contact::{Side, nodes, row_along};
+use super::prescribed::Prescribed;
+use super::{Constraints, Kind, Row};
+use crate::contact::ContactPair;
+use crate::contact::known::Pairs;
+use crate::vector::{cross, dot, length};
+
+/// Friction at a contact pair whose rows are on this rank.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slider {
+    /// Number of the pair.
+    pub pair: usize,
+    /// Index of the contact in the scene.
+    pub contact: usize,
+    /// Row of the normal.
+    pub normal: usize,
+    /// Rows along the surface, one or two.
+    pub tangents: Vec<Tangent>,
+    /// All of the slave surface that belongs to the pair (area).
+    pub share: f64,
+}
+
+/// A friction row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangent {
+    /// The row.
+    pub row: usize,
+    /// Unit vector along the surface.
+    pub direction: [f64; 3],
+}
+
+/// A direction is in the plane of others up to this sine.
+const FLAT: f64 = 1e-6;
+
+/// Orthonormal directions for the friction rows of a pair: orthogonal to its normal, to the directions `taken` at its node, and to
+/// axes that are not `free` on any node.
+pub(super) fn directions(normal: [f64; 3], free: [bool; 3], taken: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let axis = |a: usize| std::array::from_fn(|b| f64::from(a == b));
+    let fixed = (0..3).filter(|&a| !free[a]).map(axis);
+    let mut basis: Vec<[f64; 3]> = Vec::new();
+    let mut add = |vector: [f64; 3]| {
+        let mut left = vector;
+        // Twice is enough.
+        for _ in 0..2 {
+            for known in &basis {
+                let along = dot(left, *known);
+                left = std::array::from_fn(|a| left[a] - along * known[a]);
+            }
+        }
+        let size = length(left);
+        (size > FLAT).then(|| {
+            basis.push(left.map(|x| x / size));
+            basis[basis.len() - 1]
+        })
+    };
+    add(normal);
+    for known in fixed.chain(taken.iter().copied()) {
+        add(known);
+    }
+    // The axis that is farthest from the normal first.
+    let least = (0..3).min_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs())).unwrap_or(0);
+    let first = add(axis(least));
+    let second = first.and_then(|first| add(cross(normal, first)));
+    let rest = [add(axis((least + 1) % 3)), add(axis((least + 2) % 3))];
+    [first, second].into_iter().chain(rest).flatten().collect()
+}
+
+/// The friction rows of pair `number`, with their directions; `taken` are the directions of other rows at its node.
+pub(super) fn rows<'a>(
+    number: usize,
+    pair: &ContactPair,
+    sides: &impl Fn(u64) -> Side<'a>,
+    taken: &[[f64; 3]],
+) -> Vec<(Row, [f64; 3])> {
+    let mut free = [false; 3];
+    for (node, factor) in nodes(pair) {
+        let supports = sides(node).1;
+        (0..3).for_each(|a| free[a] |= supports[a].is_none() && factor != 0.0);
+    }
+    let found = directions(pair.normal, free, taken).into_iter().zip(0..);
+    let row = |(direction, axis): ([f64; 3], u8)| {
+        let row = row_along(direction, Kind::Friction { pair: number, axis }, pair, sides).ok()?;
+        Some((row, direction))
+    };
+    let mut rows: Vec<(Row, [f64; 3])> = found.filter_map(row).collect();
+    let scale = rows.iter().fold(f64::INFINITY, |scale, (row, _)| row.scale.min(scale));
+    rows.iter_mut().for_each(|(row, _)| row.lengthen(scale / row.scale));
+    rows
+}
+
+impl Constraints {
+    /// Finds the sliders, once all rows are there; `directions` are those of the friction rows, in their order.
+    pub(super) fn find_sliders(&mut self, pairs: &Pairs, directions: Vec<[f64; 3]>) {
+        let mut directions = directions.into_iter();
+        let mut normals = std::collections::HashMap::new();
+        for (row, of) in self.rows.iter().enumerate() {
+            match of.kind {
+                Kind::Contact { pair } => {
+                    normals.insert(pair, row);
+                }
+                Kind::Friction { pair, .. } => {
+                    let tangent = Tangent { row, direction: directions.next().expect("one for each row") };
+                    match self.sliders.last_mut().filter(|last| last.pair == pair) {
+                        Some(last) => last.tangents.push(tangent),
+                        None => {
+                            let ContactPair { contact, share, .. } = pairs[pair];
+                            let tangents = vec![tangent];
+                            self.sliders.push(Slider { pair, contact, normal: normals[&pair], tangents, share });
+                        }
+                    }
+                }
+                Kind::Gluing | Kind::Support { .. } => {}
+            }
+        }
+    }
+
+    /// Adds to right-hand sides how far obstacles are moved along friction rows.
+    pub(super) fn add_drags(&self, at: &Prescribed, rhs: &mut [f64]) {
+        for Slider { pair, tangents, .. } in &self.sliders {
+            let Some(drag) = at.drags.get(pair) else { continue };
+            for Tangent { row, direction } in tangents {
+                rhs[*row] += self.rows[*row].scale * dot(*direction, *drag);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_are_orthonormal_and_leave_out_what_is_held() {
+        let free = [true; 3];
+        for normal in [[0.0, 0.0, -1.0], [0.6, 0.0, 0.8], [0.48, -0.6, 0.64], [1.0, 0.0, 0.0]] {
+            let found = directions(normal, free, &[]);
+            assert_eq!(found.len(), 2);
+            let all = [normal, found[0], found[1]];
+            for (i, a) in all.iter().enumerate() {
+                for (j, b) in all.iter().enumerate() {
+                    assert!((dot(*a, *b) - f64::from(i == j)).abs() < 1e-15, "{all:?}");
+                }
+            }
+            // Held along y: one direction, orthogonal to y.
+            if normal[1] == 0.0 {
+                let found = directions(normal, [true, false, true], &[]);
+                assert_eq!((found.len(), found[0][1]), (1, 0.0));
+            }
+            assert!(directions(normal, [false, false, true], &[]).len() <= 1);
+        }
+        // At an edge: along it.
+        let found = directions([0.0, 0.0, 1.0], free, &[[1.0, 0.0, 0.0]]);
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].map(f64::abs), [0.0, 1.0, 0.0]);
+        assert!(directions([0.0, 0.0, 1.0], free, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).is_empty());
+    }
+}

@@ -1,0 +1,328 @@
+//! Discs in an active set: `|x_T| <= r(x_n)` for pairs `T` of unknowns, by a primal-dual active set.
+//!
+//! With the gradient's negative `v` (what slides), a flexibility `f > 0` and `z = x_T + v_T / f` the conditions of a disc are one
+//! equation (Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008)):
+//!
+//! ```text
+//! x_T = z  where |z| <= r  (it sticks: v_T = 0),      x_T = r z / |z|  elsewhere  (it slips)
+//! ```
+//!
+//! Newton's method for the second one, with `d = z / |z|`, fixes the unknown along `d` at `r`, and leaves the one across, `y`, to a
+//! spring: `v across d = c y` with the compliance `c = f (|z| / r - 1)`. Each set is a symmetric linear problem. The radius is a
+//! constant, or grows with another unknown `x_n`; it is that of the set before, so that with the sets radii converge, too. Where
+//! nothing presses (`r = 0`) the disc is a point.
+
+use super::discs;
+
+/// A pair goes on sticking or slipping this share of the radius beyond the border, so that rounding makes no pair come and go that is just
+/// on it.
+const ROUNDING: f64 = 1e-9;
+
+/// Unknowns this share of the radius from the border are on it.
+const BORDER: f64 = 1e-9;
+
+/// A disc.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disc {
+    /// The unknown that its radius grows with.
+    pub normal: usize,
+    /// Its unknowns; a second one if it has two.
+    pub entries: (usize, Option<usize>),
+    /// Its radius: a constant, and a factor of the unknown that it grows with.
+    pub radius: [f64; 2],
+    /// How far its unknowns move the gradient: about the diagonal of the matrix.
+    pub flexibility: f64,
+}
+
+/// What is known of the unknowns of a disc.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Slide {
+    /// They are zero.
+    Open,
+    /// They are free.
+    Stick,
+    /// The one along the slip is at the border, the one across hangs on a spring.
+    Slip {
+        /// Unit vector along the slip.
+        direction: [f64; 2],
+        /// The radius.
+        radius: f64,
+        /// Of the spring.
+        compliance: f64,
+    },
+}
+
+impl Slide {
+    /// Sets with the same names are the same set.
+    fn name(self) -> [bool; 2] {
+        match self {
+            Self::Open => [false, false],
+            Self::Stick => [true, false],
+            Self::Slip { .. } => [true, true],
+        }
+    }
+}
+
+/// The discs of a rank, and what is known of each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Slides {
+    /// The discs.
+    pub discs: Vec<Disc>,
+    /// Of each.
+    pub states: Vec<Slide>,
+}
+
+impl Disc {
+    /// Its numbers in a vector.
+    fn of(&self, x: &[f64]) -> [f64; 2] {
+        [x[self.entries.0], self.entries.1.map_or(0.0, |second| x[second])]
+    }
+
+    /// Writes its numbers into a vector.
+    fn put(&self, [a, b]: [f64; 2], x: &mut [f64]) {
+        x[self.entries.0] = a;
+        if let Some(second) = self.entries.1 {
+            x[second] = b;
+        }
+    }
+
+    /// The unknown across a slip.
+    fn across(&self, direction: [f64; 2], x: &[f64]) -> f64 {
+        let (across, x) = (across(direction), self.of(x));
+        across[0] * x[0] + across[1] * x[1]
+    }
+
+    /// Its radius where the unknown it grows with has this value.
+    pub fn radius(&self, x: &[f64]) -> f64 {
+        let [constant, factor] = self.radius;
+        constant + factor * f64::max(0.0, x[self.normal])
+    }
+
+    /// What the unknowns and what slides tell of it. A change between sticking and slipping takes more than `tolerance` of what slides.
+    fn judge(&self, state: Slide, x: &[f64], v: &[f64], tolerance: f64) -> Slide {
+        let radius = self.radius(x);
+        if radius <= 0.0 {
+            return Slide::Open;
+        }
+        let ([a, b], [s, t]) = (self.of(x), self.of(v));
+        let z = [a + s / self.flexibility, b + t / self.flexibility];
+        let size = z[0].hypot(z[1]);
+        let margin = tolerance / self.flexibility;
+        let slips = match state {
+            // Of one unknown the other border is far: what slips against it sticks first.
+            Slide::Slip { direction, .. } if self.entries.1.is_none() && s * direction[0] < -tolerance => false,
+            Slide::Slip { .. } => size > radius * (1.0 - ROUNDING) - margin,
+            Slide::Open => size > radius,
+            Slide::Stick => size > radius * (1.0 + ROUNDING) + margin,
+        };
+        if !slips || size == 0.0 {
+            return Slide::Stick;
+        }
+        let compliance = self.flexibility * f64::max(0.0, size / radius - 1.0);
+        Slide::Slip { direction: z.map(|z| z / size), radius, compliance }
+    }
+}
+
+impl Slides {
+    /// Discs of which nothing is known: all are open.
+    pub fn open(discs: Vec<Disc>) -> Self {
+        let states = vec![Slide::Open; discs.len()];
+        Self { discs, states }
+    }
+
+    /// Discs as unknowns `x` and what slides, `v`, tell.
+    pub fn told(discs: Vec<Disc>, x: &[f64], v: &[f64]) -> Self {
+        let states = discs.iter().map(|disc| disc.judge(Slide::Open, x, v, 0.0)).collect();
+        Self { discs, states }
+    }
+
+    /// The radius of each disc at some unknowns.
+    pub fn radii(&self, x: &[f64]) -> Vec<f64> {
+        self.discs.iter().map(|disc| disc.radius(x)).collect()
+    }
+
+    /// The discs of these radii, for the difference of unknowns to some `start`.
+    pub fn around(&self, start: &[f64], radii: &[f64]) -> Vec<discs::Disc> {
+        let of = |(disc, &radius): (&Disc, &f64)| {
+            let (first, second) = disc.entries;
+            let centre = disc.of(start).map(|x| -x);
+            discs::Disc { entries: [first, second.unwrap_or(first)], centre, radius }
+        };
+        self.discs.iter().zip(radii).map(of).collect()
+    }
+
+    /// What a change of radii moves the gradient by, at the first unknown of each disc.
+    pub fn change(&self, radii: &[f64], next: &[f64], n: usize) -> Vec<f64> {
+        let mut change = vec![0.0; n];
+        for ((disc, radius), next) in self.discs.iter().zip(radii).zip(next) {
+            change[disc.entries.0] = disc.flexibility * (next - radius);
+        }
+        change
+    }
+
+    /// Follows unknowns in discs of these radii: what is on the border slips along them.
+    pub fn settle(&mut self, x: &[f64], radii: &[f64]) {
+        for ((disc, state), &radius) in self.discs.iter().zip(&mut self.states).zip(radii) {
+            let [a, b] = disc.of(x);
+            let size = a.hypot(b);
+            *state = match radius {
+                0.0 => Slide::Open,
+                _ if size < (1.0 - BORDER) * radius => Slide::Stick,
+                _ => Slide::Slip { direction: [a / size, b / size], radius, compliance: 0.0 },
+            };
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.discs.is_empty()
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (&Disc, Slide)> {
+        self.discs.iter().zip(self.states.iter().copied())
+    }
+
+    /// Marks the unknowns that need not be what [`Slides::fix`] makes them.
+    pub fn mark(&self, kept: &mut [bool]) {
+        for (disc, state) in self.iter() {
+            let (first, second) = disc.entries;
+            let free = match state {
+                Slide::Open => false,
+                Slide::Stick => true,
+                Slide::Slip { .. } => second.is_some(),
+            };
+            [Some(first), second].into_iter().flatten().for_each(|entry| kept[entry] = free);
+        }
+    }
+
+    /// Of marked unknowns those that do not move: none of discs that slip.
+    pub fn held(&self, kept: &[bool]) -> Vec<bool> {
+        let mut held = kept.to_vec();
+        for (disc, ..) in self.slipping() {
+            let (first, second) = disc.entries;
+            [Some(first), second].into_iter().flatten().for_each(|entry| held[entry] = false);
+        }
+        held
+    }
+
+    /// Open discs whose unknowns are kept stick.
+    pub fn adopt(&mut self, kept: &[bool]) {
+        for (disc, state) in self.discs.iter().zip(&mut self.states) {
+            if *state == Slide::Open && kept[disc.entries.0] {
+                *state = Slide::Stick;
+            }
+        }
+    }
+
+    /// Unknowns of discs of two that slip, with the unit vector across.
+    pub fn across(&self) -> impl Iterator<Item = ([usize; 2], [f64; 2])> {
+        self.slipping().filter_map(|(disc, direction, _)| Some(([disc.entries.0, disc.entries.1?], across(direction))))
+    }
+
+    /// Those of two unknowns that slip, with the direction and the compliance of the spring across.
+    fn slipping(&self) -> impl Iterator<Item = (&Disc, [f64; 2], f64)> {
+        self.iter().filter_map(|(disc, state)| match state {
+            Slide::Slip { direction, compliance, .. } if disc.entries.1.is_some() => {
+                Some((disc, direction, compliance))
+            }
+            _ => None,
+        })
+    }
+
+    /// Gives unknowns their fixed parts: none where open, the radius along the slip.
+    pub fn fix(&self, x: &mut [f64]) {
+        for (disc, state) in self.iter() {
+            match state {
+                Slide::Open => disc.put([0.0; 2], x),
+                Slide::Stick => {}
+                Slide::Slip { direction, radius, .. } => {
+                    let (y, across) = (disc.across(direction, x), across(direction));
+                    disc.put(std::array::from_fn(|k| radius * direction[k] + y * across[k]), x);
+                }
+            }
+        }
+    }
+
+    /// The fixed parts alone.
+    pub fn fixed(&self, n: usize) -> Vec<f64> {
+        let mut x = vec![0.0; n];
+        self.fix(&mut x);
+        x
+    }
+
+    /// `y += factor C x` with the compliance `C` of the springs.
+    pub fn add_compliance(&self, factor: f64, x: &[f64], y: &mut [f64]) {
+        for (disc, direction, compliance) in self.slipping() {
+            let (force, across) = (factor * compliance * disc.across(direction, x), across(direction));
+            let [a, b] = disc.of(y);
+            disc.put([a + force * across[0], b + force * across[1]], y);
+        }
+    }
+
+    /// Scales a vector by the share of the matrix that springs leave to the rest: `f / (f + c)` across slips.
+    pub fn soften(&self, x: &mut [f64]) {
+        for (disc, direction, compliance) in self.slipping() {
+            let taken = compliance / (disc.flexibility + compliance) * disc.across(direction, x);
+            let ([a, b], across) = (disc.of(x), across(direction));
+            disc.put([a - taken * across[0], b - taken * across[1]], x);
+        }
+    }
+
+    /// Adds to `z` what springs make of a gradient `r`: `c / (f + c)^2` times it. Between two softened vectors and the rest's inverse
+    /// that is an inverse of the sum: the stiffness scaling of constraints that give way.
+    pub fn add_springs(&self, r: &[f64], z: &mut [f64]) {
+        for (disc, direction, compliance) in self.slipping() {
+            let sum = disc.flexibility + compliance;
+            let added = compliance / (sum * sum) * disc.across(direction, r);
+            let ([a, b], across) = (disc.of(z), across(direction));
+            disc.put([a + added * across[0], b + added * across[1]], z);
+        }
+    }
+
+    /// The states that the unknowns and what slides, `v`, tell. A change between sticking and slipping takes more than `tolerance` of
+    /// what slides.
+    pub fn next(&self, x: &[f64], v: &[f64], tolerance: f64) -> Vec<Slide> {
+        self.iter().map(|(disc, state)| disc.judge(state, x, v, tolerance)).collect()
+    }
+
+    /// Compares with other states, into vectors of zeros: 1 into `changed` at the first unknown of discs with another name or that
+    /// are fixed otherwise; how far unknowns are from what those states say, as a gradient, into `fixed` for what they fix and into
+    /// `hung` for what hangs on springs.
+    pub fn compare(&self, next: &[Slide], x: &[f64], [changed, fixed, hung]: [&mut [f64]; 3]) {
+        for ((disc, state), next) in self.iter().zip(next) {
+            changed[disc.entries.0] = f64::from(next.name() != state.name());
+            let Slide::Slip { direction, radius, compliance } = *next else { continue };
+            let (here, beside) = (disc.of(x), disc.across(direction, x));
+            let along = here[0] * direction[0] + here[1] * direction[1] - radius;
+            let turned = matches!(state, Slide::Slip { direction: from, .. } if from[0] * direction[0] + from[1] * direction[1] < 0.0);
+            if turned {
+                hung[disc.entries.0] = disc.flexibility * along.hypot(beside);
+                continue;
+            }
+            fixed[disc.entries.0] = disc.flexibility * along;
+            hung[disc.entries.0] = (disc.flexibility + compliance) * beside;
+        }
+    }
+
+    /// Follows the radii of other states of the same names: the matrix stays the same.
+    pub fn shift(&mut self, next: &[Slide]) {
+        for (state, next) in self.states.iter_mut().zip(next) {
+            if let (Slide::Slip { radius, .. }, Slide::Slip { radius: to, .. }) = (state, *next) {
+                *radius = to;
+            }
+        }
+    }
+
+    /// What tells this set from others.
+    pub fn names(&self) -> impl Iterator<Item = bool> {
+        self.states.iter().flat_map(|state| state.name())
+    }
+}
+
+/// The unit vector across another one.
+fn across([a, b]: [f64; 2]) -> [f64; 2] {
+    [-b, a]
+}
+
+#[cfg(test)]
+mod tests;

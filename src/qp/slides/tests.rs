@@ -1,0 +1,153 @@
+//! Active sets of discs against projected gradients, which know no sets.
+
+use super::super::active_set::{self, Face, Guess};
+use super::super::pcpg::Directions;
+use super::super::quadratic::Quadratic;
+use super::super::tests::dense::{Matrix, Plain, Random, distance, dot};
+use super::super::{Limits, Outcome};
+use super::*;
+
+const LIMITS: Limits = Limits { relative: 1e-10, reference: None, absolute: 0.0, drop: 0.0, products: 5000 };
+
+/// A dense matrix on what a set leaves free.
+struct Dense {
+    a: Matrix,
+    kept: Vec<bool>,
+    slides: Slides,
+}
+
+impl Dense {
+    fn mask(&self, x: &mut [f64]) {
+        x.iter_mut().zip(&self.kept).for_each(|(x, kept)| *x *= f64::from(*kept));
+        for ([i, j], [a, b]) in self.slides.across() {
+            let y = a * x[i] + b * x[j];
+            (x[i], x[j]) = (a * y, b * y);
+        }
+    }
+}
+
+impl Quadratic for Dense {
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.a.apply(x, y);
+        self.slides.add_compliance(1.0, x, y);
+    }
+
+    fn project(&mut self, x: &mut [f64]) {
+        self.mask(x);
+    }
+
+    fn precondition(&mut self, _: &[f64], _: &mut [f64]) -> bool {
+        false
+    }
+}
+
+impl Face for Dense {
+    fn restrict(&mut self, kept: &mut [bool], slides: &Slides) -> bool {
+        (self.kept, self.slides) = (kept.to_vec(), slides.clone());
+        true
+    }
+
+    fn restore(&mut self, _: &mut [f64]) {}
+
+    fn gaps(&mut self, _: &mut [f64]) {}
+}
+
+/// Discs `(3k, 3k + 1)` whose radius is a constant and grows with the unknown `3k + 2`, which is not negative; the last one is an
+/// interval.
+fn discs(a: &Matrix, radius: impl Fn(usize) -> [f64; 2]) -> Vec<Disc> {
+    let disc = |k: usize| {
+        let flexibility = a.entries[3 * k * a.n + 3 * k];
+        let second = (3 * k + 3 < a.n).then_some(3 * k + 1);
+        Disc { normal: 3 * k + 2, entries: (3 * k, second), radius: radius(k), flexibility }
+    };
+    (0..a.n / 3).map(disc).collect()
+}
+
+/// By projected gradients, radii following.
+fn projected(a: &Matrix, d: &[f64], discs: &[Disc]) -> Vec<f64> {
+    let mut x = vec![0.0; a.n];
+    for _ in 0..200_000 {
+        let gradient: Vec<f64> = a.times(&x).iter().zip(d).map(|(ax, d)| ax - d).collect();
+        let mut next: Vec<f64> = x.iter().zip(&gradient).map(|(x, g)| x - g).collect();
+        for disc in discs {
+            next[disc.normal] = next[disc.normal].max(0.0);
+            let [radius, size] = [disc.radius(&next), disc.of(&next)[0].hypot(disc.of(&next)[1])];
+            if size > radius {
+                disc.put(disc.of(&next).map(|x| x * radius / size), &mut next);
+            }
+        }
+        let moved = distance(&x, &next);
+        x = next;
+        if moved < 1e-14 {
+            break;
+        }
+    }
+    x
+}
+
+fn solved(a: Matrix, d: &[f64], discs: Vec<Disc>) -> active_set::Solution {
+    let n = a.n;
+    let bounded: Vec<bool> = (0..n).map(|i| i % 3 == 2).collect();
+    let slides = Slides::open(discs);
+    let mut kept = vec![true; n];
+    slides.mark(&mut kept);
+    let mut face = Dense { a, kept: kept.clone(), slides: slides.clone() };
+    let guess = Guess {
+        x: vec![0.0; n],
+        residual: d.to_vec(),
+        kept,
+        slides,
+        has_discs: true,
+        uneven: false,
+        directions: Directions::default(),
+    };
+    active_set::solve(&Plain, &mut face, &bounded, guess, &LIMITS)
+}
+
+#[test]
+fn sets_of_discs_end_where_projected_gradients_do() {
+    let mut seen = [0; 3];
+    for seed in 0..60 {
+        let mut random = Random::new(seed);
+        let a = Matrix::with_condition(18, 20.0, &mut random);
+        let d = random.vector(18);
+        // Constant radii, small to large; then radii that follow an unknown.
+        let constant = 10.0_f64.powf(f64::from(seed as u32 % 5) - 2.0);
+        for radius in [[constant, 0.0], [0.0, 0.3], [0.0, 0.0]] {
+            let discs = discs(&a, |_| radius);
+            let expected = projected(&a, &d, &discs);
+            let found = solved(Matrix::new(a.n, a.entries.clone()), &d, discs);
+            assert_eq!(found.outcome, Outcome::Converged, "{seed} {radius:?}");
+            let size = dot(&expected, &expected).sqrt();
+            assert!(distance(&found.x, &expected) < 1e-7 * size.max(1e-3), "{seed} {radius:?}");
+            for state in &found.slides.states {
+                seen[usize::from(state.name()[0]) + usize::from(state.name()[1])] += 1;
+            }
+        }
+    }
+    assert!(seen.iter().all(|count| *count > 50), "open, stick and slip all occur: {seen:?}");
+}
+
+#[test]
+fn a_disc_fixes_along_its_slip_and_springs_act_across() {
+    let disc = Disc { normal: 2, entries: (0, Some(1)), radius: [0.5, 0.0], flexibility: 2.0 };
+    let mut slides = Slides::open(vec![disc]);
+    // z = x + v / f = (0, 2): beyond the radius.
+    slides.states = slides.next(&[0.0, 0.5, 0.0], &[0.0, 3.0, 0.0], 0.0);
+    assert_eq!(slides.states, [Slide::Slip { direction: [0.0, 1.0], radius: 0.5, compliance: 6.0 }]);
+    let (mut x, mut y) = (vec![0.25, 9.0, 1.0], vec![0.0; 3]);
+    slides.fix(&mut x);
+    assert_eq!(x, [0.25, 0.5, 1.0]);
+    slides.add_compliance(2.0, &x, &mut y);
+    assert_eq!(y, [3.0, 0.0, 0.0]);
+    // The scaled inverse of 2 + 6 on a unit vector across.
+    let (mut soft, mut z) = (vec![1.0, 0.0, 0.0], vec![0.0; 3]);
+    slides.soften(&mut soft);
+    slides.add_springs(&[1.0, 0.0, 0.0], &mut z);
+    assert!((soft[0] * soft[0] / 2.0 + z[0] - 1.0 / 8.0).abs() < 1e-15);
+    let mut kept = vec![false; 3];
+    slides.mark(&mut kept);
+    assert_eq!((&kept[..], &slides.held(&kept)[..]), (&[true, true, false][..], &[false; 3][..]));
+    // z = (0, 0.25): inside.
+    assert_eq!(slides.next(&[0.0, 0.5, 0.0], &[0.0, -0.5, 0.0], 1e-9), [Slide::Stick]);
+}

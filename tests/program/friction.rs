@@ -1,0 +1,283 @@
+//! Friction: closed forms, an independent program's numbers, and what must be refused.
+
+use crate::common::fields::{Fields, state_at};
+use crate::common::{
+    assert_close, assert_near, number, run_briefly, run_misused, scene_file, solve, solve_tightly, vector,
+};
+use serde_json::Value;
+
+/// A cube of 1000 mm on a plane with friction, pressed with 100 MPa, its top moved along x; nu = 0. `tau` are the shear tractions
+/// of a homogeneous state.
+fn block(element: &str, law: &str, moved: f64, tau: f64) -> String {
+    format!(
+        r#"
+        [material.steel]
+        young = 210000.0
+        poisson = 0.0
+        [body.cube]
+        material = "steel"
+        element = "{element}"
+        brick = {{ origin = [0.0, 0.0, 0.0], size = [1000.0, 1000.0, 1000.0], cells = [4, 2, 2] }}
+        [support.top]
+        surface = "cube.zmax"
+        fix = ["x"]
+        displacement = [{moved:?}, 0.0, 0.0]
+        [support.side]
+        surface = "cube.ymin"
+        fix = ["y"]
+        [load]
+        top = {{ surface = "cube.zmax", traction = [0.0, 0.0, -100.0] }}
+        right = {{ surface = "cube.xmax", traction = [0.0, 0.0, {tau:?}] }}
+        left = {{ surface = "cube.xmin", traction = [0.0, 0.0, {:?}] }}
+        [contact.floor]
+        slave = "cube.zmin"
+        rigid = {{ plane = {{ point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }} }}
+        {law}
+        [decomposition]
+        cells = [2, 2, 2]
+        "#,
+        -tau
+    )
+}
+
+fn rubbed<'a>(summary: &'a Value, contact: &str, key: &str) -> &'a Value {
+    &summary["friction"][contact][key]
+}
+
+/// Sticks below `U* = mu p h / G`, slips by `U - U*` beyond.
+#[test]
+fn a_block_sticks_up_to_the_threshold_and_slips_by_what_is_beyond() {
+    let directory = tempfile::tempdir().unwrap();
+    for element in ["tet4", "hex8"] {
+        let scene = scene_file(directory.path(), &block(element, "friction = 0.3", 0.2, 21.0));
+        let run = solve_tightly(2, &scene, &[]);
+        let summary = run.summary();
+        assert_eq!(
+            (rubbed(&summary, "floor", "slipping"), rubbed(&summary, "floor", "sticking")),
+            (&0.into(), &15.into())
+        );
+        assert_near("force of the floor", vector(&summary["contact_force"]), [-21e6, 0.0, 100e6], 1e-9);
+
+        let scene = scene_file(directory.path(), &block(element, "friction = 0.3", 1.0, 30.0));
+        let run = solve_tightly(2, &scene, &[]);
+        let summary = run.summary();
+        assert_eq!(rubbed(&summary, "floor", "slipping"), &15, "{element}");
+        assert_near("friction", vector(rubbed(&summary, "floor", "force")), [-30e6, 0.0, 0.0], 1e-9);
+        let dissipation = rubbed(&summary, "floor", "dissipation").as_f64().unwrap();
+        assert_close("dissipation", dissipation, 30e6 * 5.0 / 7.0, 1e-9);
+        let fields = Fields::read(&run.result());
+        let (slip, status) = (fields.of_points("slip"), fields.integers_of_points("contact_status"));
+        for (slip, status) in slip.chunks_exact(3).zip(status) {
+            assert!(status == -1 || (status == 2 && (slip[0] - 5.0 / 7.0).abs() < 1e-9 && slip[1].abs() < 1e-9));
+        }
+        assert!(number(&summary, "residual_friction") < 1e-9);
+        // The safeguard alone, at the usual tolerances.
+        let summary = solve(2, &scene, &["solver.qp=smalse-m"]).converged().summary();
+        assert_near("friction", vector(rubbed(&summary, "floor", "force")), [-30e6, 0.0, 0.0], 1e-5);
+    }
+    // Tresca's law with the limit mu p is the same where pressures are uniform.
+    let scene = scene_file(directory.path(), &block("hex8", "shear_limit = 30.0", 1.0, 30.0));
+    let summary = solve_tightly(1, &scene, &[]).summary();
+    assert_near("Tresca", vector(&summary["contact_force"]), [-30e6, 0.0, 100e6], 1e-9);
+}
+
+/// The plane drags the block instead: its motion counts as slip. The same at a step of its own, and back again.
+#[test]
+fn an_obstacle_drags() {
+    let directory = tempfile::tempdir().unwrap();
+    let text = block("hex8", "friction = 0.3\ndisplacement = [-1.0, 0.0, 0.0]", 0.0, 30.0);
+    let summary = solve_tightly(2, &scene_file(directory.path(), &text), &[]).summary();
+    assert_near("friction", vector(rubbed(&summary, "floor", "force")), [-30e6, 0.0, 0.0], 1e-9);
+    let dissipation = rubbed(&summary, "floor", "dissipation").as_f64().unwrap();
+    assert_close("dissipation", dissipation, 30e6 * 5.0 / 7.0, 1e-9);
+}
+
+/// Whatever the pressures, all that slips has a friction of `mu N`.
+#[test]
+fn a_dragged_plate_is_held_by_mu_times_the_normal_force() {
+    let directory = tempfile::tempdir().unwrap();
+    let text = r#"
+        [material.steel]
+        young = 210000.0
+        poisson = 0.0
+        [body.plate]
+        material = "steel"
+        element = "hex8"
+        brick = { origin = [0.0, 0.0, 0.0], size = [1000.0, 1000.0, 200.0], cells = [10, 10, 2] }
+        [support.top]
+        surface = "plate.zmax"
+        fix = ["x", "y"]
+        displacement = [1.0, 0.0, 0.0]
+        [load.top]
+        surface = "plate.zmax"
+        traction = [0.0, 0.0, -100.0]
+        [contact.floor]
+        slave = "plate.zmin"
+        rigid = { plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] } }
+        friction = 0.3
+        [decomposition]
+        cells = [5, 5, 2]
+        "#;
+    let summary = solve_tightly(2, &scene_file(directory.path(), text), &[]).summary();
+    let [x, _, z] = vector(&summary["contact_force"]);
+    // Mean dilatation turns slips by half a thousandth.
+    assert_close("T / N", -x / z, 0.3, 1e-6);
+    assert_eq!(rubbed(&summary, "floor", "sticking"), &0);
+}
+
+/// A block on a plane that leans by `angle` (degrees), which nothing else holds.
+fn incline(angle: f64) -> String {
+    let (sine, cosine) = angle.to_radians().sin_cos();
+    format!(
+        r#"
+        [material.steel]
+        young = 210000.0
+        poisson = 0.3
+        [body.block]
+        material = "steel"
+        element = "hex8"
+        brick = {{ origin = [0.0, 0.0, 0.0], size = [400.0, 400.0, 100.0], cells = [4, 4, 2] }}
+        [load.weight]
+        body = "block"
+        body_force = [{:?}, 0.0, {:?}]
+        [contact.floor]
+        slave = "block.zmin"
+        rigid = {{ plane = {{ point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }} }}
+        friction = 0.3
+        [decomposition]
+        cells = [2, 2, 2]
+        "#,
+        1e-3 * sine,
+        -1e-3 * cosine
+    )
+}
+
+#[test]
+fn a_block_on_an_incline_sticks_up_to_the_angle_of_friction_and_is_refused_beyond() {
+    let directory = tempfile::tempdir().unwrap();
+    let limit = 0.3_f64.atan().to_degrees();
+    for angle in [5.0, limit - 0.5] {
+        let summary = solve(2, &scene_file(directory.path(), &incline(angle)), &[]).converged().summary();
+        let weight = 1e-3 * 400.0 * 400.0 * 100.0;
+        let (sine, cosine) = angle.to_radians().sin_cos();
+        let expected = [-weight * sine, 0.0, weight * cosine];
+        assert_near("force of the floor", vector(&summary["contact_force"]), expected, 1e-5);
+    }
+    for angle in [limit + 0.01, 30.0] {
+        let run = run_briefly(2, &["solve", &scene_file(directory.path(), &incline(angle))]);
+        assert_eq!(run.code, 65, "{}", run.stderr);
+        assert!(run.stderr.contains("loads drive its translation along (0.958, 0.000, 0.287)"), "{}", run.stderr);
+    }
+}
+
+/// A bar between two planes with friction, pulled at its end and let go: slip lengths `P / q` and `P / 2 q`. Exact at nodes where
+/// that is a whole number of elements (Coulomb's law with uniform pressure).
+#[test]
+fn a_pulled_bar_slips_as_far_as_friction_takes_and_keeps_half_of_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let gap = -100.0 * 50.0 / 210_000.0;
+    let text = format!(
+        r#"
+        [material.steel]
+        young = 210000.0
+        poisson = 0.0
+        [body.bar]
+        material = "steel"
+        element = "hex8"
+        brick = {{ origin = [0.0, 0.0, 0.0], size = [1000.0, 100.0, 100.0], cells = [20, 1, 1] }}
+        [support.end]
+        surface = "bar.xmin"
+        fix = ["x"]
+        [support.front]
+        surface = "bar.ymin"
+        fix = ["y"]
+        [support.back]
+        surface = "bar.ymax"
+        fix = ["y"]
+        [load.pull]
+        surface = "bar.xmax"
+        traction = [300.0, 0.0, 0.0]
+        [contact.low]
+        slave = "bar.zmin"
+        rigid = {{ plane = {{ point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }} }}
+        gap = {gap:?}
+        friction = 0.3
+        [contact.high]
+        slave = "bar.zmax"
+        rigid = {{ plane = {{ point = [0.0, 0.0, 100.0], normal = [0.0, 0.0, -1.0] }} }}
+        gap = {gap:?}
+        friction = 0.3
+        [[step]]
+        name = "pull"
+        [[step]]
+        name = "let go"
+        load.pull = 0.0
+        [decomposition]
+        cells = [5, 1, 1]
+        "#
+    );
+    let scene = scene_file(directory.path(), &text);
+    let runs = [1, 3].map(|ranks| solve_tightly(ranks, &scene, &[]));
+    for (time, expected) in [(0, 9e12 / (2.0 * 210_000.0 * 1e4 * 6000.0)), (1, 9e12 / (4.0 * 210_000.0 * 1e4 * 6000.0))]
+    {
+        let end = state_at(&runs[0].result(), time).0.values().map(|u| u[0]).fold(0.0, f64::max);
+        assert_close("displacement of the end", end, expected, 1e-9);
+    }
+    let bits = |k: usize| Fields::at(&runs[k].result(), 1).bits(&["VTKHDF/PointData"]);
+    assert_eq!(bits(0), bits(1), "the same bits on any ranks");
+}
+
+/// The benchmark of the paper with friction, against an independent monolithic program.
+#[test]
+fn the_benchmark_with_friction_is_that_of_an_independent_program() {
+    let references = [
+        (&["contact.joint.friction=0.3"][..], -1146151385.787, [61868694.19, 172934.66, 206615059.700], [0, 81], 5661),
+        (
+            &["contact.joint.shear_limit=10.0"],
+            -1181002843.212,
+            [24222683.38, -145518.85, 198649388.276],
+            [0, 275],
+            6424,
+        ),
+    ];
+    for (sets, energy, force, counts, plastic) in references {
+        let summary = solve_tightly(2, "two-blocks", sets).summary();
+        assert_close("J", number(&summary, "energy"), energy, 1e-9);
+        assert_near("contact force", vector(&summary["contact_force"]), force, 1e-9);
+        assert_eq!(number(&summary, "plastic_elements") as usize, plastic);
+        let found = ["sticking", "slipping"].map(|key| rubbed(&summary, "joint", key).as_u64().unwrap());
+        assert_eq!(found, counts, "{sets:?}");
+    }
+}
+
+#[test]
+fn friction_costs_little_and_none_costs_nothing() {
+    let bits = |sets: &[&str]| {
+        let run = solve(2, "two-blocks", sets).converged();
+        (number(&run.summary(), "hessian_multiplications"), Fields::read(&run.result()).bits(&["VTKHDF/PointData"]))
+    };
+    let (without, plain) = bits(&[]);
+    assert_eq!(bits(&["contact.joint.friction=0.0"]), (without, plain));
+    assert!(bits(&["contact.joint.friction=0.3"]).0 <= 2.0 * without);
+    assert!(bits(&["contact.joint.shear_limit=10.0"]).0 <= 2.0 * without);
+}
+
+#[test]
+fn contradictory_friction_is_refused() {
+    for (set, message) in [
+        (&["contact.joint.friction=-0.1"][..], "must be a finite number that is not negative"),
+        (&["contact.joint.friction=0.1", "contact.joint.shear_limit=1.0"], "two laws of friction"),
+        (&["contact.joint.shear_limit=nan"], "must be a finite number"),
+        (&["contact.joint.friction=0.3", "solver.error=0.01"], "there is no energy that is least"),
+        (
+            &["contact.joint.friction=0.3", "limit.tolerance=0.01", "material.lower.hardening=0.0"],
+            "remove friction and shear_limit",
+        ),
+    ] {
+        let mut arguments = vec!["solve", "two-blocks"];
+        set.iter().for_each(|set| arguments.extend(["--set", set]));
+        let run = run_misused(2, &arguments);
+        assert_eq!(run.code, 65, "{}", run.stderr);
+        assert!(run.stderr.contains(message), "{}", run.stderr);
+    }
+}
