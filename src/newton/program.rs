@@ -339,7 +339,7 @@ impl Programs {
             }
             // The multiplier of G x = 0 follows from b on the rows that the last program kept. The slack of open contacts
             // is part of b too, but is no rigid motion.
-            let multiplier = self.face.as_ref().map(|face| {
+            let mut multiplier = self.face.as_ref().map(|face| {
                 let mut a = face.amplitudes(coarse, &b);
                 a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
                 let mut multiplier = vec![0.0; b.len()];
@@ -349,7 +349,6 @@ impl Programs {
             let lower = problem.laws().lower_bounds(&start);
             // With a norm that is not a number SMALSE-M ends as `Outcome::NotFinite`.
             let norm = self.norm.unwrap_or(f64::NAN);
-            let mut multiplier = multiplier;
             for round in 0..ROUNDS {
                 let set = match problem.constraints.has_friction {
                     false => FeasibleSet::above(lower.clone()),
