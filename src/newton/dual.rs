@@ -132,7 +132,7 @@ pub struct DualFace<'s, 'a> {
 
 /// The friction rows of which slips leave one combination free.
 pub fn sliding(slides: &Slides) -> Sliding {
-    Sliding::new(slides.across().map(|(rows, direction)| Across { rows, direction }).collect())
+    Sliding::new(slides.across().map(|(rows, direction, is_soft)| Across { rows, direction, is_soft }).collect())
 }
 
 /// A contact resists a motion if this changes `B u` there by more than this share of the largest change in any row.

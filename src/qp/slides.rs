@@ -21,6 +21,9 @@ const ROUNDING: f64 = 1e-9;
 /// Unknowns this share of the radius from the border are on it.
 const BORDER: f64 = 1e-9;
 
+/// A spring that gives way this many times as far as the matrix is soft. What has to balance should not hang on it.
+const SOFT: f64 = 30.0;
+
 /// A disc.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disc {
@@ -109,8 +112,8 @@ impl Disc {
         let size = z[0].hypot(z[1]);
         let margin = tolerance / self.flexibility;
         let slips = match state {
-            // Of one unknown the other border is far: what slips against it sticks first.
-            Slide::Slip { direction, .. } if self.entries.1.is_none() && s * direction[0] < -tolerance => false,
+            // The other border is far: what slides against its friction sticks first.
+            Slide::Slip { direction, .. } if s * direction[0] + t * direction[1] < -tolerance => false,
             Slide::Slip { .. } => size > radius * (1.0 - ROUNDING) - margin,
             Slide::Open => size > radius,
             Slide::Stick => size > radius * (1.0 + ROUNDING) + margin,
@@ -214,9 +217,12 @@ impl Slides {
         }
     }
 
-    /// Unknowns of discs of two that slip, with the unit vector across.
-    pub fn across(&self) -> impl Iterator<Item = ([usize; 2], [f64; 2])> {
-        self.slipping().filter_map(|(disc, direction, _)| Some(([disc.entries.0, disc.entries.1?], across(direction))))
+    /// Unknowns of discs of two that slip, with the unit vector across, and whether the spring there is soft.
+    pub fn across(&self) -> impl Iterator<Item = ([usize; 2], [f64; 2], bool)> {
+        self.slipping().filter_map(|(disc, direction, compliance)| {
+            let is_soft = compliance > SOFT * disc.flexibility;
+            Some(([disc.entries.0, disc.entries.1?], across(direction), is_soft))
+        })
     }
 
     /// Those of two unknowns that slip, with the direction and the compliance of the spring across.
@@ -285,22 +291,19 @@ impl Slides {
         self.iter().map(|(disc, state)| disc.judge(state, x, v, tolerance)).collect()
     }
 
-    /// Compares with other states, into vectors of zeros: 1 into `changed` at the first unknown of discs with another name or that
-    /// are fixed otherwise; how far unknowns are from what those states say, as a gradient, into `fixed` for what they fix and into
-    /// `hung` for what hangs on springs.
+    /// Compares with other states, into vectors of zeros, at the first unknown of each disc: 1 into `changed` where the name is another;
+    /// where it slips as before what another radius moves the gradient by into `fixed`, and how far unknowns are from what the other
+    /// state says besides, as a gradient, into `hung`.
     pub fn compare(&self, next: &[Slide], x: &[f64], [changed, fixed, hung]: [&mut [f64]; 3]) {
         for ((disc, state), next) in self.iter().zip(next) {
             changed[disc.entries.0] = f64::from(next.name() != state.name());
             let Slide::Slip { direction, radius, compliance } = *next else { continue };
             let (here, beside) = (disc.of(x), disc.across(direction, x));
-            let along = here[0] * direction[0] + here[1] * direction[1] - radius;
-            let turned = matches!(state, Slide::Slip { direction: from, .. } if from[0] * direction[0] + from[1] * direction[1] < 0.0);
-            if turned {
-                hung[disc.entries.0] = disc.flexibility * along.hypot(beside);
-                continue;
-            }
-            fixed[disc.entries.0] = disc.flexibility * along;
-            hung[disc.entries.0] = (disc.flexibility + compliance) * beside;
+            let along = here[0] * direction[0] + here[1] * direction[1];
+            let Slide::Slip { radius: before, .. } = state else { continue };
+            fixed[disc.entries.0] = disc.flexibility * (radius - before);
+            let across = (disc.flexibility + compliance) * beside;
+            hung[disc.entries.0] = (disc.flexibility * (along - before)).hypot(across);
         }
     }
 

@@ -12,6 +12,8 @@ pub struct Across {
     pub rows: [usize; 2],
     /// `a`, a unit vector.
     pub direction: [f64; 2],
+    /// Whether a multiplier there gives way much further than its neighbours do.
+    pub is_soft: bool,
 }
 
 /// All such pairs of a rank.
@@ -47,7 +49,7 @@ impl Sliding {
     /// `Pi` of a row that is kept.
     pub(super) fn weight(&self, row: usize) -> Weight {
         let Some(&pair) = self.of_row.get(&row) else { return 1.0.into() };
-        let Across { rows, direction: [a, b] } = self.pairs[pair];
+        let Across { rows, direction: [a, b], .. } = self.pairs[pair];
         match row == rows[0] {
             true => Weight { own: a * a, other: Some((rows[1], a * b)) },
             false => Weight { own: b * b, other: Some((rows[0], a * b)) },
@@ -56,7 +58,7 @@ impl Sliding {
 
     /// `rows = Pi rows`.
     pub fn mask(&self, rows: &mut [f64]) {
-        for Across { rows: [i, j], direction: [a, b] } in &self.pairs {
+        for Across { rows: [i, j], direction: [a, b], .. } in &self.pairs {
             let across = a * rows[*i] + b * rows[*j];
             (rows[*i], rows[*j]) = (a * across, b * across);
         }
@@ -65,6 +67,14 @@ impl Sliding {
     /// The pair that a row is in.
     pub(super) fn of(&self, row: usize) -> Option<&Across> {
         self.of_row.get(&row).map(|pair| &self.pairs[*pair])
+    }
+
+    /// Of kept rows those that are not soft.
+    pub(super) fn firm(&self, kept: &[bool]) -> Vec<bool> {
+        let mut firm = kept.to_vec();
+        let soft = self.pairs.iter().filter(|pair| pair.is_soft);
+        soft.flat_map(|pair| pair.rows).for_each(|row| firm[row] = false);
+        firm
     }
 
     /// Whether there is none.

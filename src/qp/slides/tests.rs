@@ -19,7 +19,7 @@ struct Dense {
 impl Dense {
     fn mask(&self, x: &mut [f64]) {
         x.iter_mut().zip(&self.kept).for_each(|(x, kept)| *x *= f64::from(*kept));
-        for ([i, j], [a, b]) in self.slides.across() {
+        for ([i, j], [a, b], _) in self.slides.across() {
             let y = a * x[i] + b * x[j];
             (x[i], x[j]) = (a * y, b * y);
         }
@@ -150,4 +150,51 @@ fn a_disc_fixes_along_its_slip_and_springs_act_across() {
     assert_eq!((&kept[..], &slides.held(&kept)[..]), (&[true, true, false][..], &[false; 3][..]));
     // z = (0, 0.25): inside.
     assert_eq!(slides.next(&[0.0, 0.5, 0.0], &[0.0, -0.5, 0.0], 1e-9), [Slide::Stick]);
+}
+
+#[test]
+fn what_swings_as_a_whole_sticks_on_the_way() {
+    // All second unknowns of discs move together, far; friction alone holds them. Fixed friction would throw them to and fro.
+    for seed in 0..20 {
+        let mut random = Random::new(seed);
+        let mut a = Matrix::with_condition(18, 5.0, &mut random);
+        for (k, l) in (0..6).flat_map(|k| (0..6).map(move |l| (k, l))) {
+            a.entries[(3 * k + 1) * a.n + 3 * l + 1] += 500.0;
+        }
+        let mut d = random.vector(18);
+        (0..6).for_each(|k| d[3 * k + 1] += 300.0);
+        (0..6).for_each(|k| d[3 * k + 2] = 3.0 + d[3 * k + 2].abs());
+        let found = solved(Matrix::new(a.n, a.entries.clone()), &d, discs(&a, |_| [0.0, 0.8]));
+        assert_eq!(found.outcome, Outcome::Converged, "{seed}");
+        assert!(found.statistics.sets < 40, "{seed}: {:?}", found.statistics);
+        // The conditions themselves: bounds, and |v| x = r v in each disc.
+        let v: Vec<f64> = a.times(&found.x).iter().zip(&d).map(|(ax, d)| d - ax).collect();
+        let most = dot(&d, &d).sqrt();
+        for disc in &found.slides.discs {
+            let (x, pressure) = (disc.of(&found.x), found.x[disc.normal]);
+            assert!(
+                pressure >= 0.0 && v[disc.normal] <= 1e-7 * most && pressure * v[disc.normal].abs() < 1e-6 * most,
+                "{seed}"
+            );
+            let (radius, slid) = (disc.radius(&found.x), disc.of(&v));
+            let size = slid[0].hypot(slid[1]);
+            assert!(x[0].hypot(x[1]) <= radius * (1.0 + 1e-6) + 1e-9 * most, "{seed}");
+            assert!((0..2).all(|k| (size * x[k] - radius * slid[k]).abs() < 1e-6 * most), "{seed}: {slid:?}");
+        }
+    }
+}
+
+#[test]
+fn soft_springs_are_told_and_turning_is_no_change_of_radius() {
+    let disc = Disc { normal: 2, entries: (0, Some(1)), radius: [0.5, 0.0], flexibility: 2.0 };
+    let mut slides = Slides::open(vec![disc]);
+    for (slides_by, is_soft) in [(3.0, false), (300.0, true)] {
+        slides.states = slides.next(&[0.0, 0.5, 0.0], &[0.0, slides_by, 0.0], 0.0);
+        assert_eq!(slides.across().collect::<Vec<_>>(), [([0, 1], [-1.0, 0.0], is_soft)]);
+    }
+    let next = slides.next(&[0.0, 0.5, 0.0], &[100.0, 300.0, 0.0], 0.0);
+    let [mut changed, mut fixed, mut hung] = [(); 3].map(|()| vec![0.0; 3]);
+    slides.compare(&next, &[0.0, 0.5, 0.0], [&mut changed, &mut fixed, &mut hung]);
+    assert_eq!((changed[0], fixed[0]), (0.0, 0.0));
+    assert!(hung[0] > 1.0, "{hung:?}");
 }
