@@ -133,6 +133,21 @@ pub fn yielding<'a>(region: &Region<'a>, u: &[f64]) -> impl Iterator<Item = &'a 
     region.subdomain.elements.iter().zip(answers).filter(|(_, answer)| answer.plastic).map(|(nodes, _)| nodes)
 }
 
+/// What is stored elastically from the first displacement to the second, one step from the committed history, and the plastic work
+/// by the mean of the stresses (energies).
+pub fn work(region: &Region, ends: [&[f64]; 2]) -> [f64; 2] {
+    let (hooke, mut sums) = (region.material.hooke(), [0.0; 2]);
+    for_each_point(&region.subdomain.elements, &region.subdomain.points, ends, |at| {
+        let committed = region.committed(at.index);
+        let [before, after] = at.strains.map(|strain| region.material.respond(&strain, committed).stress);
+        let total: f64 = (0..6).map(|i| 0.5 * (before[i] + after[i]) * (at.strains[1][i] - at.strains[0][i])).sum();
+        let stored = 0.5 * (hooke.complementary_square(&after) - hooke.complementary_square(&before));
+        sums[0] += at.weight * stored;
+        sums[1] += at.weight * (total - stored);
+    });
+    sums
+}
+
 /// `v'K_e v` of each vector (energy).
 pub fn elastic_squares<const M: usize>(region: &Region, vectors: [&[f64]; M]) -> [f64; M] {
     let mut squares = [0.0; M];

@@ -212,6 +212,7 @@ fn residual_lines(residuals: &Residuals) -> Vec<String> {
         ("complementarity", residuals.complementarity),
         ("friction", residuals.friction.filter(|friction| *friction != 0.0)),
         ("balance", residuals.balance),
+        ("energies", residuals.energies),
     ];
     let known = rows.into_iter().filter_map(|(name, value)| value.map(|v| format!("  {name:<16}{v:>12.3e}")));
     ["relative residuals".to_owned()].into_iter().chain(known).collect()

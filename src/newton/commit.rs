@@ -1,14 +1,15 @@
 //! Commits the end of an increment: histories at the integration points, and the largest sizes so far.
 
 use super::committed::Sizes;
-use super::problem::{State, TornProblem};
+use super::iterate::Iterate;
+use super::problem::TornProblem;
 use crate::assembly::internal;
 use crate::feti::Torn;
 
 impl TornProblem<'_> {
-    /// Commits a displacement, where the problem is in this `state`, with its multipliers: from now on the problem is the next
-    /// increment. Collective.
-    pub fn commit(&mut self, u: &Torn, state: &State, lambda: &[f64]) {
+    /// Commits the end of an increment: from now on the problem is the next one. Collective.
+    pub fn commit(&mut self, Iterate { u, state, lambda, energies, .. }: &Iterate) {
+        self.committed.energies = *energies;
         let sizes = Sizes { elastic_norm: self.elastic_norm(u), ..self.measure(u, state, lambda).1 };
         self.committed.sizes = self.committed.sizes.larger(sizes);
         self.commit_slips(&self.slack(u));

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::energies::Energies;
 use crate::material::History;
 
 /// The state that an increment starts from; by default that of rest.
@@ -13,6 +14,8 @@ pub struct Committed {
     pub slips: Vec<f64>,
     /// Least sizes that relative errors refer to.
     pub sizes: Sizes,
+    /// Energies since the beginning; unknown after a result that others go on from.
+    pub energies: Option<Energies>,
 }
 
 /// The largest values of the increments so far. After an unloading errors are of the size of the values before.

@@ -8,14 +8,13 @@ use std::mem::{replace, take};
 
 use super::control::{Control, firm};
 use super::damping::{self, Damped};
-use super::errors::Errors;
 use super::forcing::{self, Forcing};
+use super::iterate::{self, Iterate};
 use super::outcome::{Next, Outcome, StepRecord};
 use super::path::{At, Attempt, Path};
 use super::problem::{State, TornProblem};
-use super::residuals::Residuals;
 use super::snapshot::{Begin, Reached, Snapshot};
-use super::step::{SolverState, Step, StepSolver};
+use super::step::{Step, StepSolver};
 use crate::feti::Torn;
 use crate::model::history::{Conditions, Stage};
 use crate::monitor::timing::Timer;
@@ -37,22 +36,6 @@ pub struct Settings {
     pub accuracy: Option<f64>,
 }
 
-/// A displacement with its multipliers, and what is known of both.
-pub struct Iterate {
-    /// Torn displacement; after a step copies agree and the bodies do not overlap, to round-off.
-    pub u: Torn,
-    /// Multipliers of this rank's rows.
-    pub lambda: Vec<f64>,
-    /// Internal forces and energies at `u`.
-    pub state: State,
-    /// Residuals of the glued problem.
-    pub residuals: Residuals,
-    /// How exact it is. Known at the end of an iteration, unless no step was taken or numbers are not finite.
-    pub errors: Option<Errors>,
-    /// Whether the accuracy ended the iteration, before the criteria were met.
-    pub ended_by_accuracy: bool,
-}
-
 /// What became of the trial of a step.
 enum Trial {
     Accepted(Step, Damped),
@@ -66,8 +49,8 @@ pub struct Newton<'a> {
     pub(super) problem: TornProblem<'a>,
     pub(super) solver: StepSolver<'a>,
     settings: Settings,
-    path: Path,
-    attempt: Attempt,
+    pub(super) path: Path,
+    pub(super) attempt: Attempt,
     pub(super) iterate: Iterate,
     /// Whether the iterate is admissible: only then `J` may not grow.
     pub(super) admissible: bool,
@@ -119,7 +102,7 @@ impl<'a> Newton<'a> {
         if let Some(control) = &control {
             (problem.loads, problem.firm) = (control.loads(), firm(&problem.materials));
         }
-        let (iterate, outcome) = first_iterate(&problem, &mut solver, (u, lambda), kept, stood, timer);
+        let (iterate, outcome) = iterate::first(&problem, &mut solver, (u, lambda), kept, stood, timer);
         let admissible = before < steps.len() || problem.is_admissible(&iterate.u);
         Self {
             problem,
@@ -325,6 +308,9 @@ impl<'a> Newton<'a> {
         if iterate.errors.is_none() && has_moved && iterate.state.energy.is_finite() {
             iterate.errors = Some(solver.errors(problem, (&iterate.u, &iterate.state), &iterate.lambda, timer));
         }
+        if outcome == Outcome::Converged {
+            self.iterate.energies = timer.time("residuals", || self.energies());
+        }
         self.outcome = Some(outcome);
     }
 
@@ -336,7 +322,7 @@ impl<'a> Newton<'a> {
     pub fn advance(&mut self, timer: &Timer) -> Next {
         let outcome = self.outcome.clone().expect("the iteration has ended");
         let (attempt, next) = if outcome == Outcome::Converged {
-            self.problem.commit(&self.iterate.u, &self.iterate.state, &self.iterate.lambda);
+            self.problem.commit(&self.iterate);
             self.reached = Some(Reached { u: self.iterate.u.clone(), lambda: self.iterate.lambda.clone() });
             let Some(attempt) = self.path.next(self.attempt) else { return Next::End };
             (attempt, Next::Increment)
@@ -358,7 +344,7 @@ impl<'a> Newton<'a> {
             Some(reached) => (reached.u.clone(), Some(problem.laws().kept(&reached.lambda, 0.0))),
             None => (problem.gather.zeros(), None),
         };
-        let (iterate, outcome) = first_iterate(problem, solver, (u, lambda), kept, None, timer);
+        let (iterate, outcome) = iterate::first(problem, solver, (u, lambda), kept, None, timer);
         self.admissible = problem.is_admissible(&iterate.u);
         (self.attempt, self.iterate, self.outcome) = (attempt, iterate, outcome);
         (self.forcing, self.before) = (Forcing::default(), self.steps.len());
@@ -369,30 +355,4 @@ impl<'a> Newton<'a> {
     pub fn finish(self) -> (TornProblem<'a>, Torn) {
         (self.problem, self.reached.map_or(self.iterate.u, |reached| reached.u))
     }
-}
-
-/// The first iterate of an attempt, and how the iteration ended if it cannot even begin. With a state of the solver, goes on
-/// from there; if rows are known to hold, with the multipliers that follow from them. Collective.
-pub(super) fn first_iterate(
-    problem: &TornProblem,
-    solver: &mut StepSolver,
-    (u, mut lambda): (Torn, Vec<f64>),
-    kept: Option<Vec<bool>>,
-    stood: Option<SolverState>,
-    timer: &Timer,
-) -> (Iterate, Option<Outcome>) {
-    let state = timer.time("internal forces", || problem.evaluate(&u));
-    let refusal = match stood {
-        Some(stood) => solver.resume(problem, stood, timer).err(),
-        None => {
-            solver.begin();
-            None
-        }
-    };
-    if let Some(kept) = kept {
-        lambda = timer.time("coarse set-up", || solver.expect(problem, &state, kept));
-    }
-    let residuals = timer.time("residuals", || problem.residuals(&u, &state, &lambda));
-    let iterate = Iterate { u, lambda, state, residuals, errors: None, ended_by_accuracy: false };
-    (iterate, refusal.map(Outcome::Singular))
 }

@@ -12,7 +12,8 @@
 
 use super::control::{add, most};
 use super::forcing::Forcing;
-use super::iteration::{Newton, first_iterate};
+use super::iterate;
+use super::iteration::Newton;
 use super::snapshot::Reached;
 use crate::feti::Torn;
 use crate::monitor::timing::Timer;
@@ -81,7 +82,7 @@ impl Newton<'_> {
     fn begin(&mut self, u: Torn, lambda: Option<&[f64]>, timer: &Timer) {
         let kept = lambda.map(|lambda| self.problem.laws().kept(lambda, 0.0));
         let rest = vec![0.0; self.problem.gather.rows()];
-        let (iterate, outcome) = first_iterate(&self.problem, &mut self.solver, (u, rest), kept, None, timer);
+        let (iterate, outcome) = iterate::first(&self.problem, &mut self.solver, (u, rest), kept, None, timer);
         (self.iterate, self.outcome, self.admissible) = (iterate, outcome, true);
         (self.forcing, self.before) = (Forcing::default(), self.steps.len());
     }

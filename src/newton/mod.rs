@@ -7,7 +7,7 @@
 //!
 //! [`problem`] is what is minimised, [`committed`] what former increments left behind. A [`step`] takes tangents to FETI and the
 //! [`program`] of a step to its QP solver ([`dual`]), as exactly as [`forcing`] says; [`damping`] finds its length. [`residuals`],
-//! [`balance`], [`certificate`] and [`errors`] tell how good an iterate is.
+//! [`balance`], [`energies`], [`certificate`] and [`errors`] tell how good an iterate is.
 
 pub mod balance;
 pub mod certificate;
@@ -16,9 +16,11 @@ pub mod committed;
 pub mod control;
 pub mod damping;
 pub mod dual;
+pub mod energies;
 pub mod errors;
 pub mod forcing;
 pub mod friction;
+pub mod iterate;
 pub mod iteration;
 pub mod limit;
 pub mod outcome;
@@ -30,7 +32,9 @@ pub mod response;
 pub mod snapshot;
 pub mod step;
 
-pub use iteration::{Iterate, Newton, Settings};
+pub use energies::Energies;
+pub use iterate::Iterate;
+pub use iteration::{Newton, Settings};
 pub use limit::Bounds;
 pub use outcome::{Next, Outcome, StepRecord};
 pub use problem::TornProblem;

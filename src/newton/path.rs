@@ -19,14 +19,29 @@ pub struct Path {
 impl Path {
     /// What is prescribed where an attempt leads.
     pub fn conditions(&self, attempt: Attempt) -> Conditions {
-        let from = attempt.stage.checked_sub(1).map_or(&self.begin, |before| &self.stages[before].end);
-        from.towards(&self.stages[attempt.stage].end, self.at(attempt).fraction)
+        self.conditions_at(attempt, attempt.part.end())
+    }
+
+    /// What is prescribed where an attempt begins.
+    pub fn before(&self, attempt: Attempt) -> Conditions {
+        self.conditions_at(attempt, attempt.part.begin())
+    }
+
+    /// What is prescribed at a fraction of an increment.
+    fn conditions_at(&self, Attempt { stage, increment, .. }: Attempt, of_increment: f64) -> Conditions {
+        let from = stage.checked_sub(1).map_or(&self.begin, |before| &self.stages[before].end);
+        from.towards(&self.stages[stage].end, self.fraction(stage, increment, of_increment))
+    }
+
+    /// The fraction of a stage at a fraction of an increment.
+    fn fraction(&self, stage: usize, increment: usize, of_increment: f64) -> f64 {
+        (increment as f64 - 1.0 + of_increment) / self.stages[stage].increments as f64
     }
 
     /// Where an attempt leads.
     pub fn at(&self, Attempt { stage, increment, part, halvings }: Attempt) -> At {
         let number = self.stages[..stage].iter().map(|stage| stage.increments).sum::<usize>() + increment;
-        let fraction = (increment as f64 - 1.0 + part.end()) / self.stages[stage].increments as f64;
+        let fraction = self.fraction(stage, increment, part.end());
         At { stage, increment, number, fraction, halvings }
     }
 
@@ -98,6 +113,11 @@ impl Attempt {
 }
 
 impl Part {
+    /// Where it begins, as a fraction of the increment.
+    fn begin(self) -> f64 {
+        self.done as f64 / (1_u64 << self.level) as f64
+    }
+
     /// Where it ends, as a fraction of the increment.
     fn end(self) -> f64 {
         (self.done + 1) as f64 / (1_u64 << self.level) as f64
@@ -141,7 +161,10 @@ mod tests {
         let alone = Part::default();
         assert_eq!((alone.end(), alone.next(), alone.halved(0)), (1.0, None, None));
         let half = alone.halved(1).expect("one halving is allowed");
-        assert_eq!((half.end(), half.next(), half.halved(1)), (0.5, Some(Part { done: 1, level: 1 }), None));
+        assert_eq!(
+            (half.begin(), half.end(), half.next(), half.halved(1)),
+            (0.0, 0.5, Some(Part { done: 1, level: 1 }), None)
+        );
         assert_eq!(half.next().and_then(Part::next), None);
     }
 }

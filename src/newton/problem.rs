@@ -4,6 +4,7 @@ use crate::vector::dot;
 use std::cell::RefCell;
 
 use super::committed::Committed;
+use super::energies::Energies;
 use crate::assembly::Region;
 use crate::assembly::internal::{self, Terms};
 use crate::constraint::Constraints;
@@ -95,7 +96,7 @@ impl<'a> TornProblem<'a> {
             modes: connection.modes(),
             loads,
             rhs,
-            committed: Committed::default(),
+            committed: Committed { energies: Some(Energies::default()), ..Committed::default() },
             constraints,
             gather: &connection.gather,
             coupling: RefCell::new(Coupling::new(constraints)),

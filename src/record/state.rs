@@ -29,6 +29,9 @@ pub struct State {
     pub internal_energy: Option<f64>,
     /// `J(u) = Psi(u) - f'u`; with what friction dissipates if its limit is given (Tresca), so that it is what is minimised.
     pub energy: Option<f64>,
+    /// Energies since the beginning of the history; null where it began from a result, with `[limit]`, and without convergence.
+    #[serde(default)]
+    pub energies: Option<Energies>,
     /// Largest length of a nodal displacement.
     pub max_displacement: Option<f64>,
     /// Largest von Mises stress of an element.
@@ -55,6 +58,21 @@ pub struct Rubbed {
     pub sticking: u64,
     /// Pairs that slip.
     pub slipping: u64,
+}
+
+/// Energies since the beginning of a history: `external = stored + plastic + friction + closing` in equilibrium.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Energies {
+    /// Work of loads, supports and moving obstacles.
+    pub external: f64,
+    /// Elastic energy.
+    pub stored: f64,
+    /// Plastic work.
+    pub plastic: f64,
+    /// What friction dissipated.
+    pub friction: f64,
+    /// What contact took besides, since increments have a size.
+    pub closing: f64,
 }
 
 /// The largest value of a measure, and where it is.
@@ -169,4 +187,7 @@ pub struct Residuals {
     /// Unbalanced force or moment of a body.
     #[serde(rename = "residual_balance")]
     pub balance: Option<f64>,
+    /// What is missing in the balance of energies, over the sum of their sizes.
+    #[serde(rename = "residual_energies", default)]
+    pub energies: Option<f64>,
 }

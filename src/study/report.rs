@@ -16,7 +16,7 @@ use crate::newton::path::At;
 use crate::newton::{self, Iterate, Newton, StepRecord, TornProblem};
 use crate::record::counts::{ContactRow, Counters};
 use crate::record::rows::{LimitLoad, NewtonRow, StepRow};
-use crate::record::state::{Acting, Errors, Measures, Residuals, Rubbed, State};
+use crate::record::state::{Acting, Energies, Errors, Measures, Residuals, Rubbed, State};
 use crate::record::summary::Summary;
 use crate::scene::{self, Friction, Scene};
 use crate::sizing::sizes::sizes;
@@ -228,7 +228,7 @@ pub(super) fn summarise(
 
 /// What a solution is like. Collective.
 fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[ContactState], von_mises: f64) -> State {
-    let (problem, Iterate { u, lambda, state, residuals, errors, ended_by_accuracy }) =
+    let (problem, Iterate { u, lambda, state, residuals, errors, energies, ended_by_accuracy }) =
         (newton.problem(), newton.iterate());
     let reactions = problem.reactions(state, lambda, discrete.supports.len());
     let (balance, residual_balance) = problem.balance(state, lambda, discrete.bodies.len());
@@ -251,6 +251,7 @@ fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[Contact
         external_work: Some(state.external_work),
         internal_energy: Some(state.internal_energy),
         energy: Some(if given == 0.0 { state.energy } else { state.energy + given }),
+        energies: energies.as_ref().map(balanced),
         max_displacement: Some(largest),
         max_von_mises: Some(maximum(von_mises)),
         residuals: Residuals {
@@ -260,6 +261,7 @@ fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[Contact
             complementarity: Some(residuals.complementarity),
             friction: Some(residuals.friction),
             balance: Some(residual_balance),
+            energies: energies.as_ref().map(newton::Energies::imbalance),
         },
         balance: scene.body.keys().cloned().zip(balance.iter().map(acting)).collect(),
         errors: Errors {
@@ -271,6 +273,12 @@ fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[Contact
         },
         measures: Measures::default(),
     }
+}
+
+/// Energies as records have them.
+fn balanced(energies: &newton::Energies) -> Energies {
+    let &newton::Energies { external, stored, plastic, friction, closing, .. } = energies;
+    Energies { external, stored, plastic, friction, closing }
 }
 
 /// What acts on a body.

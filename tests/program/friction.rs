@@ -281,3 +281,91 @@ fn contradictory_friction_is_refused() {
         assert!(run.stderr.contains(message), "{}", run.stderr);
     }
 }
+
+/// Applications of F beside those without friction, which depend on no machine; strong friction on parts of any shape, too.
+#[test]
+fn friction_costs_few_more_applications_of_the_dual_operator() {
+    let applications = |law: &str, cut: &str| {
+        let run = solve(1, "two-blocks", &[law, cut]).converged();
+        number(&run.summary(), "hessian_multiplications")
+    };
+    for (cut, most) in [("bricks", [2.0, 2.0, 1.6]), ("metis", [2.0, 2.5, 2.0])] {
+        let cut = format!("decomposition.method=\"{cut}\"");
+        let plain = applications("contact.joint.friction=0.0", &cut);
+        for (law, most) in ["friction=0.3", "friction=0.8", "shear_limit=10.0"].into_iter().zip(most) {
+            let found = applications(&format!("contact.joint.{law}"), &cut);
+            assert!(found <= most * plain, "{law}, {cut}: {found} beside {plain}");
+        }
+    }
+}
+
+/// Energy of a summary.
+fn energy(summary: &Value, name: &str) -> f64 {
+    summary["energies"][name].as_f64().unwrap_or_else(|| panic!("no {name} in {}", summary["energies"]))
+}
+
+/// To the threshold and on: what comes in is stored or rubbed away, and nothing is left for the size of the increments.
+#[test]
+fn energies_of_a_block_that_slips_are_those_of_the_closed_form() {
+    let directory = tempfile::tempdir().unwrap();
+    let threshold = 0.3 * 100.0 * 1000.0 / 105_000.0;
+    let text = block("hex8", "friction = 0.3", 1.0, 30.0)
+        + &format!(
+            "\n[[step]]\nsupport = {{ top = {threshold:?} }}\n[[step]]\nsupport = {{ top = 1.0 }}\nincrements = 3\n"
+        );
+    let summary = solve_tightly(2, &scene_file(directory.path(), &text), &[]).summary();
+    // A cube of 1 m, in N mm: 100 MPa down, 30 MPa of shear.
+    let stored = 1e9 * (100.0 * 100.0 / (2.0 * 210_000.0) + 30.0 * 30.0 / (2.0 * 105_000.0));
+    let friction = 30e6 * (1.0 - threshold);
+    assert_close("stored", energy(&summary, "stored"), stored, 1e-8);
+    assert_close("friction", energy(&summary, "friction"), friction, 1e-8);
+    assert_close("external", energy(&summary, "external"), stored + friction, 1e-8);
+    assert!(energy(&summary, "closing").abs() < 1e-8 * friction, "{}", summary["energies"]);
+    assert!(energy(&summary, "plastic").abs() < 1e-8 * friction, "{}", summary["energies"]);
+    assert!(number(&summary, "residual_energies") < 1e-8);
+}
+
+/// With yielding bodies, a moving obstacle that drags, and a way back: energies balance in each increment, and on any ranks and
+/// resumed they are the same bits.
+#[test]
+fn energies_balance_where_bodies_yield_and_obstacles_drag() {
+    let directory = tempfile::tempdir().unwrap();
+    let text = r#"
+        material.steel = { young = 210000.0, poisson = 0.3, yield_stress = 200.0, hardening = 5000.0 }
+        [body.cube]
+        material = "steel"
+        element = "hex8"
+        brick = { origin = [0.0, 0.0, 0.0], size = [100.0, 100.0, 50.0], cells = [4, 4, 2] }
+        [support.bottom]
+        surface = "cube.zmin"
+        fix = ["x", "y", "z"]
+        [contact.punch]
+        slave = "cube.zmax"
+        rigid = { plane = { point = [0.0, 0.0, 50.0], normal = [0.0, 0.0, -1.0] } }
+        displacement = [0.1, 0.02, -0.2]
+        friction = 0.4
+        [[step]]
+        increments = 3
+        [[step]]
+        amplitude = 0.4
+        increments = 2
+        [decomposition]
+        cells = [2, 2, 2]
+        "#;
+    let scene = scene_file(directory.path(), text);
+    let summary = solve_tightly(2, &scene, &[]).summary();
+    let steps = summary["steps"].as_array().expect("increments");
+    assert_eq!(steps.len(), 5);
+    for step in steps {
+        assert!(number(step, "residual_energies") < 1e-8, "{}", step["energies"]);
+    }
+    assert!(energy(&summary, "plastic") > 0.0 && energy(&summary, "friction") > 0.0, "{}", summary["energies"]);
+    let total: f64 = steps.iter().map(|step| rubbed(step, "punch", "dissipation").as_f64().unwrap()).sum();
+    assert_close("friction", energy(&summary, "friction"), total, 1e-9);
+    // The sum of small increments is the integral: closing loses its share.
+    let fine = solve_tightly(2, &scene, &["step.0.increments=12", "step.1.increments=8"]).summary();
+    let share = |summary: &Value| energy(summary, "closing").abs() / energy(summary, "external").abs();
+    assert!(share(&fine) < 0.5 * share(&summary), "{} {}", share(&fine), share(&summary));
+    let other = solve_tightly(3, &scene, &[]).summary();
+    assert_eq!(other["energies"], summary["energies"]);
+}

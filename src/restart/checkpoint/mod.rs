@@ -28,6 +28,7 @@ use crate::material::History;
 use crate::model::discrete::Discrete;
 use crate::newton::committed::{Committed, Sizes};
 use crate::newton::control::Reach;
+use crate::newton::energies::Energies;
 use crate::newton::forcing::Forcing;
 use crate::newton::path::Attempt;
 use crate::newton::program::ProgramState;
@@ -50,6 +51,7 @@ struct Numbers {
     meshes: Vec<u64>,
     attempt: Attempt,
     sizes: Sizes,
+    energies: Option<Energies>,
     has_reached: bool,
     /// Of all attempts, with the number of the increment.
     steps: Vec<(usize, StepRecord)>,
@@ -123,6 +125,7 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         meshes: fingerprints(comm, discrete),
         attempt: newton.attempt,
         sizes: newton.committed.sizes,
+        energies: newton.committed.energies,
         has_reached: newton.reached.is_some(),
         steps: newton.steps,
         before: newton.before,
@@ -214,7 +217,12 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
     let reached = numbers.has_reached.then_some(Reached { u: arrays.reached_u, lambda: arrays.reached_lambda });
     let newton = Snapshot {
         attempt: numbers.attempt,
-        committed: Committed { histories: arrays.histories, sizes: numbers.sizes, slips: arrays.slips },
+        committed: Committed {
+            histories: arrays.histories,
+            sizes: numbers.sizes,
+            slips: arrays.slips,
+            energies: numbers.energies,
+        },
         reached,
         steps: numbers.steps,
         before: numbers.before,

@@ -1,0 +1,129 @@
+//! Energies from the beginning of a history: what comes in, what is stored, what is lost.
+//!
+//! With forces `f`, reactions, stresses and multipliers at both ends of an increment, loads and supports do the work on the left:
+//!
+//! ```text
+//! 1/2 (f_0 + f_1)'du + of supports and obstacles  =  stored + plastic + friction + of closing
+//! plastic    1/2 (s_0 + s_1) : (de - C^-1 ds)      friction  l_t'ds, at the end of the increment
+//! closing    1/2 (l_0 + l_1)'dg - friction         what the size of the increment makes of contact
+//! ```
+//!
+//! Both sides come from different numbers: loads and reactions from nodes, stored and plastic work from elements, the rest from
+//! contact rows. They agree where the ends are in equilibrium. The work of closing vanishes with the size of increments.
+
+use serde::{Deserialize, Serialize};
+
+use super::iteration::Newton;
+use super::problem::{State, TornProblem};
+use super::residuals::relative;
+use crate::assembly::internal;
+use crate::constraint::Kind;
+use crate::feti::Torn;
+use crate::model::history::Conditions;
+use crate::vector::dot;
+
+/// Energies since the beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Energies {
+    /// Work of loads, supports and moving obstacles.
+    pub external: f64,
+    /// Elastic energy.
+    pub stored: f64,
+    /// Plastic work: what flow dissipates, and what hardening stores.
+    pub plastic: f64,
+    /// What friction dissipates.
+    pub friction: f64,
+    /// What contact takes besides, since an increment has a size: where gaps close, and where friction grows.
+    pub closing: f64,
+    /// Sum of the sizes of all these parts.
+    gross: f64,
+}
+
+/// One end of an increment.
+struct End<'e> {
+    u: &'e Torn,
+    state: &'e State,
+    lambda: &'e [f64],
+    conditions: &'e Conditions,
+}
+
+impl Energies {
+    /// What is missing, relative to the sizes of all parts.
+    pub fn imbalance(&self) -> f64 {
+        let missing = self.external - self.stored - self.plastic - self.friction - self.closing;
+        relative(missing.abs(), self.gross)
+    }
+
+    /// This and the work of another increment.
+    fn and(&self, [external, stored, plastic, friction, closing]: [f64; 5]) -> Self {
+        let parts = [external, stored, plastic, friction, closing];
+        Self {
+            external: self.external + external,
+            stored: self.stored + stored,
+            plastic: self.plastic + plastic,
+            friction: self.friction + friction,
+            closing: self.closing + closing,
+            gross: self.gross + parts.iter().map(|part| part.abs()).sum::<f64>(),
+        }
+    }
+}
+
+impl Newton<'_> {
+    /// Those up to the iterate, where this is an equilibrium. Unknown where a history goes on from a result, and
+    /// where loads follow the work they do. Collective.
+    pub(super) fn energies(&self) -> Option<Energies> {
+        let (problem, iterate) = (&self.problem, &self.iterate);
+        let before = problem.committed.energies.filter(|_| self.control.is_none())?;
+        let rest = || (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
+        let (u, lambda) = self.reached.as_ref().map_or_else(rest, |end| (end.u.clone(), end.lambda.clone()));
+        let TornProblem { loads, rhs, friction, .. } = problem;
+        let now = Conditions { loads: loads.clone(), rhs: rhs.clone(), friction: friction.clone() };
+        let begin =
+            End { u: &u, state: &problem.evaluate(&u), lambda: &lambda, conditions: &self.path.before(self.attempt) };
+        let end = End { u: &iterate.u, state: &iterate.state, lambda: &iterate.lambda, conditions: &now };
+        Some(before.and(problem.increment_of_work(&begin, &end)))
+    }
+}
+
+impl TornProblem<'_> {
+    /// The parts of the work of an increment, in the order of [`Energies`]. Three collectives and some neighbour exchanges.
+    fn increment_of_work(&self, begin: &End, end: &End) -> [f64; 5] {
+        // Loads by nodes; stored and plastic work by elements.
+        let mut change = end.u.clone();
+        change.iter_mut().flatten().zip(begin.u.iter().flatten()).for_each(|(u, before)| *u -= before);
+        let mut partial = Vec::with_capacity(3 * change.len());
+        for (own, region) in self.regions().iter().enumerate() {
+            let of_loads =
+                dot(&begin.conditions.loads[own], &change[own]) + dot(&end.conditions.loads[own], &change[own]);
+            let [stored, plastic] = internal::work(region, [&begin.u[own], &end.u[own]]);
+            partial.extend([0.5 * of_loads, stored, plastic]);
+        }
+        let sums = self.space.sum(&partial, 3);
+
+        // Supports and contact by rows: forces at both ends, and how far they move beside what moves by itself.
+        let mut moved = vec![0.0; self.gather.rows()];
+        self.gather.apply(&change, &mut moved);
+        let supports =
+            [begin, end].map(|at| self.along(&self.off_balance(at), |kind| matches!(kind, Kind::Support { .. })));
+        let contacts = [begin, end].map(|at| self.of_contact(at.lambda));
+        let mean = |[a, b]: &[Vec<f64>; 2]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect() };
+        let (supports, pressed) = (mean(&supports), mean(&contacts));
+        let given: Vec<f64> =
+            end.conditions.rhs.iter().zip(&begin.conditions.rhs).map(|(c, before)| c - before).collect();
+        let beside: Vec<f64> = moved.iter().zip(&given).map(|(moved, given)| moved - given).collect();
+        let mut rubs = vec![0.0; self.gather.rows()];
+        let tangents = self.constraints.sliders.iter().flat_map(|slider| &slider.tangents);
+        tangents.for_each(|tangent| rubs[tangent.row] = end.lambda[tangent.row]);
+        let pairs = [(&supports[..], &moved[..]), (&pressed, &given), (&pressed, &beside), (&rubs, &beside)];
+        let [held, dragged, contact, friction] = self.space.dots(&pairs)[..] else { unreachable!("four products") };
+        [sums[0] - held - dragged, sums[1], sums[2], friction, contact - friction]
+    }
+
+    /// `f - F(u) - B_I'lambda_I` at an end.
+    fn off_balance(&self, at: &End) -> Torn {
+        let mut left = at.conditions.loads.clone();
+        left.iter_mut().flatten().zip(at.state.forces.iter().flatten()).for_each(|(f, internal)| *f -= internal);
+        self.gather.add_transpose(-1.0, &self.of_contact(at.lambda), &mut left);
+        left
+    }
+}
