@@ -23,6 +23,9 @@ pub type Radii = Vec<f64>;
 /// What slips by less than this share of the largest displacement sticks.
 const ROUNDING: f64 = 1e-9;
 
+/// What is held by less than this share of the largest friction force sticks, too: what moves there is the tolerance.
+const BORDER: f64 = 1.0 - 1e-4;
+
 /// Friction at one pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rubbing {
@@ -128,7 +131,8 @@ impl TornProblem<'_> {
 impl Rubbing {
     /// Whether surfaces that touch stick or slip; `size` is that of displacements.
     pub fn status(&self, size: f64) -> Status {
-        if length(self.slip) > ROUNDING * size { Status::Slip } else { Status::Closed }
+        let slips = length(self.slip) > ROUNDING * size && length(self.force) >= BORDER * self.limit;
+        if slips { Status::Slip } else { Status::Closed }
     }
 
     /// What it dissipates (energy).

@@ -21,6 +21,9 @@ const ROUNDING: f64 = 1e-9;
 /// Unknowns this share of the radius from the border are on it.
 const BORDER: f64 = 1e-9;
 
+/// A radius that moves what slides by this share of the tolerance is rounding.
+const NOTHING: f64 = 1e-3;
+
 /// A spring that gives way this many times as far as the matrix is soft. What has to balance should not hang on it.
 const SOFT: f64 = 30.0;
 
@@ -104,7 +107,7 @@ impl Disc {
     /// What the unknowns and what slides tell of it. A change between sticking and slipping takes more than `tolerance` of what slides.
     fn judge(&self, state: Slide, x: &[f64], v: &[f64], tolerance: f64) -> Slide {
         let radius = self.radius(x);
-        if radius <= 0.0 {
+        if radius <= NOTHING * tolerance / self.flexibility {
             return Slide::Open;
         }
         let ([a, b], [s, t]) = (self.of(x), self.of(v));
