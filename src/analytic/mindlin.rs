@@ -1,5 +1,5 @@
-//! A cylinder that is pressed on a half space and then pushed along it, with friction, in plane strain: Cattaneo and Mindlin (Johnson,
-//! Contact Mechanics, 1985, 7.2).
+//! A cylinder, or a ball, that is pressed on a half space and then pushed along it, with friction: Cattaneo and Mindlin (Johnson,
+//! Contact Mechanics, 1985, 7.2). The cylinder is in plane strain:
 //!
 //! ```text
 //! a^2 = 4 P R / (pi E*),   p(x) = p0 sqrt(1 - x^2/a^2),   p0 = 2 P / (pi a),   c/a = sqrt(1 - Q / (mu P))
@@ -10,6 +10,9 @@
 //! which holds for equal materials, and for a rigid body on one that keeps its volume. `P` and `Q` are forces on a unit of length.
 
 use std::f64::consts::PI;
+
+use super::bisect;
+use crate::material::VonMises;
 
 /// The contact under both forces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +52,37 @@ impl Line {
     }
 }
 
+/// A rigid ball on a half space that is pressed and pushed. Friction acts along the push, and the surface does not move across it:
+/// so it is without Poisson's ratio, and nearly so with one.
+///
+/// ```text
+/// c/a = (1 - Q / (mu P))^(1/3),   moves by 3 mu P / (16 a) (2 - nu) / G (1 - c^2/a^2)
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Radius `c` of what sticks.
+    pub sticking: f64,
+    /// How far the half space is moved along, far from the ball.
+    pub moved: f64,
+}
+
+impl Ball {
+    /// Of a contact of radius `a`, with the forces `P` and `Q`.
+    pub fn new(material: &VonMises, radius: f64, friction: f64, [pressed, pushed]: [f64; 2]) -> Self {
+        let share = (1.0 - pushed / (friction * pressed)).cbrt();
+        let compliance = 2.0 * (1.0 + material.poisson) * (2.0 - material.poisson) / material.young;
+        let moved = 3.0 * friction * pressed / (16.0 * radius) * compliance * (1.0 - share * share);
+        Self { sticking: share * radius, moved }
+    }
+
+    /// The radius that sticks, from that of the contact and the mean square of the distance under the friction stress, which is
+    /// `2/5 (a^5 - c^5) / (a^3 - c^3)`.
+    pub fn sticking_of(radius: f64, mean_square: f64) -> f64 {
+        let square = |c: f64| 0.4 * (radius.powi(5) - c.powi(5)) / (radius.powi(3) - c.powi(3));
+        bisect(0.0, radius, |c| square(c) < mean_square)
+    }
+}
+
 fn arch(x: f64) -> f64 {
     (1.0 - x * x).max(0.0).sqrt()
 }
@@ -84,5 +118,23 @@ mod tests {
         assert!((pressed / 1000.0 - 1.0).abs() < 1e-6 && (pushed / 150.0 - 1.0).abs() < 1e-6, "{pressed} {pushed}");
         let square = integral(&|x| x * x * line.traction(x)) / pushed;
         assert!((Line::sticking_of(line.half, square) / line.sticking - 1.0).abs() < 1e-5, "{square}");
+    }
+
+    /// Two equal balls move by twice as much as each; the numbers are those of an independent program.
+    #[test]
+    fn a_ball_sticks_within_a_circle() {
+        let Ball { sticking, moved } =
+            Ball::new(&VonMises::elastic(210_000.0, 0.3), 0.687534433537, 0.3, [1000.0, 150.0]);
+        assert!((sticking / 0.545696441531 - 1.0).abs() < 1e-10, "{sticking}");
+        assert!((2.0 * moved / 1.274409792e-3 - 1.0).abs() < 1e-9, "{moved}");
+        // Over r = a sin t.
+        let (a, c, count) = (1.0, 0.7, 40_000);
+        let stress = |r: f64| arch(r / a) - c / a * arch(r / c);
+        let integral = |power: i32| -> f64 {
+            let at = |k: usize| (k as f64 + 0.5) / count as f64 * 0.5 * PI;
+            (0..count).map(|k| at(k).sin().powi(power) * stress(at(k).sin()) * at(k).cos()).sum()
+        };
+        let found = Ball::sticking_of(a, integral(3) / integral(1));
+        assert!((found / c - 1.0).abs() < 1e-5, "{found}");
     }
 }

@@ -23,17 +23,22 @@ const CELL: f64 = 0.04;
 /// Thickness of the slice of the block.
 const SLICE: f64 = 0.08;
 
-/// Planes from zero: cells where it touches, and from there on ever wider ones.
-fn planes(fine: usize) -> Vec<f64> {
-    let mut planes: Vec<f64> = (0..=fine).map(|k| k as f64 * CELL).collect();
-    let mut width = CELL;
-    let mut last = fine as f64 * CELL;
+/// Planes from zero: cells so wide where it touches, and from there on each so many times as wide as the one before.
+pub(super) fn planes(fine: usize, cell: f64, growth: f64) -> Vec<f64> {
+    let mut planes: Vec<f64> = (0..=fine).map(|k| k as f64 * cell).collect();
+    let mut width = cell;
+    let mut last = fine as f64 * cell;
     while last < 15.0 {
-        width *= 1.4;
+        width *= growth;
         last += width;
         planes.push(last);
     }
     planes
+}
+
+/// The same on the other side of zero.
+pub(super) fn mirrored(planes: &[f64]) -> Vec<f64> {
+    planes[1..].iter().rev().map(|x| -x).collect()
 }
 
 /// The cylinder on its block.
@@ -45,8 +50,7 @@ impl Case for Cylinder {
     }
 
     fn scene(&self) -> String {
-        let (right, down) = (planes(22), planes(10));
-        let mirrored = |planes: &[f64]| planes[1..].iter().rev().map(|x| -x).collect::<Vec<_>>();
+        let (right, down) = (planes(22, CELL, 1.4), planes(10, CELL, 1.4));
         let (x, z) = ([mirrored(&right), right].concat(), [mirrored(&down), vec![0.0]].concat());
         let (steel, centre) = (material_line("steel", &BLOCK), RADIUS - APPROACH);
         format!(

@@ -14,6 +14,7 @@ mod limits;
 mod manufactured;
 mod measured;
 mod mindlin;
+mod mindlin_ball;
 mod plate;
 mod press_fit;
 mod radial;
@@ -85,6 +86,7 @@ pub fn cases() -> Vec<&'static dyn Case> {
     cases.extend(limits::WALLS.iter().map(|case| case as &dyn Case));
     cases.push(&limits::Footing);
     cases.push(&hertz::Ball);
+    cases.push(&mindlin_ball::Ball);
     cases
 }
 
