@@ -10,7 +10,10 @@ pub mod hertz;
 pub mod hollow_sphere;
 pub mod homogeneous;
 pub mod manufactured;
+pub mod mindlin;
 pub mod nested_spheres;
+pub mod press_fit;
+pub mod rubbing;
 
 /// The point of [low, high] where `is_below` turns from true to false, to the last bit.
 fn bisect(mut low: f64, mut high: f64, is_below: impl Fn(f64) -> bool) -> f64 {

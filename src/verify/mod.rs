@@ -4,6 +4,7 @@
 //! pipeline, as a user's scene would, on each of its meshes and with each of its elements; a [`Measured`] says what became
 //! of its errors, and whether they are as small, or fall as fast, as they must ([`Demand`]).
 
+mod bar;
 mod blocks;
 mod cylinders;
 mod friction;
@@ -12,8 +13,13 @@ mod homogeneous;
 mod limits;
 mod manufactured;
 mod measured;
+mod mindlin;
+mod mindlin_ball;
+mod plate;
+mod press_fit;
 mod radial;
 mod run;
+mod sliding;
 mod spheres;
 
 use serde::Serialize;
@@ -69,6 +75,10 @@ pub fn cases() -> Vec<&'static dyn Case> {
     cases.extend(homogeneous::CASES.iter().map(|case| case as &dyn Case));
     cases.extend(blocks::CASES.iter().map(|case| case as &dyn Case));
     cases.extend(friction::BLOCKS.iter().map(|case| case as &dyn Case));
+    let rubbing: [&dyn Case; 6] =
+        [&sliding::Dragged, &sliding::Incline, &sliding::Wedge, &press_fit::Pressed, &plate::Plate, &mindlin::Cylinder];
+    cases.extend(bar::BARS.iter().map(|case| case as &dyn Case));
+    cases.extend(rubbing);
     cases.extend(manufactured::CASES.iter().map(|case| case as &dyn Case));
     cases.extend(spheres::HOLLOW.iter().map(|case| case as &dyn Case));
     cases.push(&spheres::Nested);
@@ -76,6 +86,7 @@ pub fn cases() -> Vec<&'static dyn Case> {
     cases.extend(limits::WALLS.iter().map(|case| case as &dyn Case));
     cases.push(&limits::Footing);
     cases.push(&hertz::Ball);
+    cases.push(&mindlin_ball::Ball);
     cases
 }
 

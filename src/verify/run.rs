@@ -207,25 +207,27 @@ impl<'a> Run<'a> {
         (sums[0] / sums[1]).sqrt()
     }
 
-    /// All contact conditions: place of the slave node, pressure, and the area it acts on. Collective.
+    /// All contact conditions: place of the slave node, pressure and friction stress, and the area they act on. Collective.
     pub fn contacts(&self) -> Vec<Touch> {
         let found = self.solved.piece.last("contact_pressure").expect("results have this field");
+        let rubbed = self.solved.piece.last("friction_traction").map(|found| found.as_chunks::<3>().0);
         let (mut mine, mut first) = (Vec::new(), 0);
         for (subdomain, _) in self.subdomains() {
             for (number, pair) in self.discrete.contacts.pairs.iter() {
                 if let Some(node) = subdomain.local_node(pair.slave) {
                     let [x, y, z] = subdomain.points[node];
                     mine.push(number as u64);
-                    mine.extend([x, y, z, found[first + node], pair.area].map(f64::to_bits));
+                    let [u, v, w] = rubbed.map_or([0.0; 3], |rubbed| rubbed[first + node]);
+                    mine.extend([x, y, z, found[first + node], pair.area, u, v, w].map(f64::to_bits));
                 }
             }
             first += subdomain.nodes.len();
         }
         // All copies of a node show the same.
         let all = all_gather_u64(self.comm, &mine);
-        let touches = all.as_chunks::<6>().0.iter().map(|&[number, x, y, z, pressure, area]| {
-            let [x, y, z, pressure, area] = [x, y, z, pressure, area].map(f64::from_bits);
-            (number, Touch { place: [x, y, z], pressure, area })
+        let touches = all.as_chunks::<9>().0.iter().map(|&[number, ref numbers @ ..]| {
+            let [x, y, z, pressure, area, friction @ ..] = numbers.map(f64::from_bits);
+            (number, Touch { place: [x, y, z], pressure, area, friction })
         });
         touches.collect::<BTreeMap<u64, Touch>>().into_values().collect()
     }
@@ -237,6 +239,8 @@ pub struct Touch {
     pub place: [f64; 3],
     pub pressure: f64,
     pub area: f64,
+    /// Friction stress on the slave's side.
+    pub friction: [f64; 3],
 }
 
 /// Distance of contact pressures from those of closed form, in the mean square over the surface, relative to them.

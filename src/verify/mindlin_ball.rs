@@ -1,0 +1,79 @@
+//! A ball pressed on a block with friction and pushed along it: [`crate::analytic::mindlin::Ball`].
+//!
+//! As the cylinder of [`super::mindlin`], rigid on a block that nearly keeps its volume, and pressed on without friction. Half of the
+//! block, by symmetry; its size makes it come 3 % less near along the normal, which is no part of this, and little along the push.
+//! Stresses across the push, which the closed form leaves out, make a percent of the radius.
+
+use super::mindlin::{mirrored, planes};
+use super::run::Run;
+use super::{Case, Demand, Error, material_line};
+use crate::analytic::hertz::Hertz;
+use crate::analytic::mindlin;
+use crate::element::Kind;
+use crate::material::VonMises;
+
+const BLOCK: VonMises = VonMises::elastic(150_000.0, 0.45);
+const RADIUS: f64 = 50.0;
+const FRICTION: f64 = 0.3;
+/// Makes a circle of contact of radius 0.7, and friction of about half of what would make all of it slip.
+const APPROACH: f64 = 0.0096;
+const PUSHED: f64 = 0.0015;
+/// Width of cells where it touches.
+const CELL: f64 = 0.12;
+
+/// The ball on its block.
+pub struct Ball;
+
+impl Case for Ball {
+    fn title(&self) -> [&'static str; 2] {
+        ["friction-ball", "a ball on a block that sticks in the middle (Cattaneo and Mindlin)"]
+    }
+
+    fn scene(&self) -> String {
+        let (aside, down) = (planes(7, CELL, 1.8), planes(5, CELL, 1.8));
+        let (x, z) = ([mirrored(&aside), aside.clone()].concat(), [mirrored(&down), vec![0.0]].concat());
+        let (steel, centre) = (material_line("steel", &BLOCK), RADIUS - APPROACH);
+        format!(
+            r#"
+            step = [{{ support.base = 0.0, friction.roll = 0.0 }}, {{}}]
+            {steel}
+            decomposition.subdomains = 12
+            contact.roll = {{ slave = "block.zmax", friction = {FRICTION:?}, rigid = {{ sphere = {{ centre = [0.0, 0.0, {centre:?}], radius = {RADIUS:?} }} }} }}
+            [support]
+            base = {{ surface = "block.zmin", fix = ["x", "y", "z"], displacement = [{PUSHED:?}, 0.0, 0.0] }}
+            side = {{ surface = "block.ymin", fix = ["y"] }}
+            [body.block]
+            material = "steel"
+            element = "tet4"
+            grid = {{ x = {x:?}, y = {aside:?}, z = {z:?} }}"#
+        )
+    }
+
+    fn levels(&self, element: Kind) -> Vec<usize> {
+        // With cells of 0.1, and smaller ones far away, it takes 40 s.
+        if element == Kind::Hex8 { vec![1] } else { Vec::new() }
+    }
+
+    fn errors(&self, run: &Run) -> Vec<Error> {
+        let [x, _, z] = run.summary().state.contact_force.unwrap_or_default();
+        let forces = [z, x].map(|force| 2.0 * force.abs());
+        let hertz = Hertz::new(&BLOCK, RADIUS, forces[0]);
+        let exact = mindlin::Ball::new(&BLOCK, hertz.radius, FRICTION, forces);
+        let touches = run.contacts();
+        let sum = |of: &dyn Fn([f64; 3], f64, f64) -> f64| -> f64 {
+            touches.iter().map(|t| t.area * of(t.place, t.pressure, t.friction[0].abs())).sum()
+        };
+        let (pressed, pushed) = (sum(&|_, p, _| p), sum(&|_, _, q| q));
+        let middle = sum(&|[x, ..], p, _| p * x) / pressed;
+        let square = |[x, y, _]: [f64; 3]| (x - middle).powi(2) + y * y;
+        // The mean square of the distance under Hertz' pressure is 2/5 a^2.
+        let radius = (2.5 * sum(&|x, p, _| p * square(x)) / pressed).sqrt();
+        let sticking = mindlin::Ball::sticking_of(radius, sum(&|x, _, q| q * square(x)) / pushed);
+        vec![
+            Error::new("contact radius", radius / hertz.radius - 1.0, Demand::Finest(0.03)),
+            Error::new("sticking radius", sticking / exact.sticking - 1.0, Demand::Finest(0.03)),
+            Error::new("way along", PUSHED / exact.moved - 1.0, Demand::Finest(0.03)),
+            Error::new("approach", APPROACH / hertz.approach - 1.0, Demand::Shown),
+        ]
+    }
+}
