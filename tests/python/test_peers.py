@@ -187,7 +187,7 @@ def test_programs_with_friction_stand_beside_a_fine_mesh(records):
     ours = rubbed("fetiplast", "tet4", 1, [2.7, 0.0, 10.5], 2.0, max_displacement=1.8)
     theirs = rubbed("calculix", "tet4", 1, [2.97, 0.0, 10.5], 30.0, max_displacement=1.8, time_total=20.0, iterations=32)
     page = "\n".join(rubbing.sections(recorded.read(records([fine, ours, theirs]))))
-    assert "trilinear hexahedra at level 5: normal force 10, friction force 3, largest displacement 2." in page
+    assert "trilinear hexahedra at level 5:\nnormal force 10, friction force 3, largest displacement 2." in page
     assert "| fetiplast | tet4 | 1 | 2 | 1.00 | 5.0e-02 | 1.0e-01 | 1.0e-01 |  | 100 | 4 Newton steps, 50 applications of F |" in page
     assert "| calculix | tet4 | 1 | 20 | 10.00 | 5.0e-02 | 1.0e-02 | 1.0e-01 | 1.0e-01 | 100 | 32 iterations |" in page
     assert rubbing.sections(recorded.read(records([ours, theirs]))) == [], "nothing without the fine mesh"

@@ -12,23 +12,24 @@ ELEMENTS = {"tet4": "linear tetrahedra", "hex8": "trilinear hexahedra"}
 FINE = "hex8", 5
 """Element and level of what the others are compared with."""
 LEVELS = {OURS: [1, 2], "calculix": [1]}
-"""CalculiX alone factorises whole matrices that are not symmetric: the next level would take an hour."""
+"""CalculiX factorises the whole matrix, which is not symmetric, in each of some thirty iterations."""
 NUMBERS = ["normal force", "friction force", "largest displacement"]
 
 HEAD = """\
 ## Friction
 
-The blocks of the benchmark, elastic, with a coefficient of friction of {friction}. The load acts at once, and all that
-touches slips.
+The blocks of the benchmark, elastic, with a coefficient of friction of {friction}. The load acts at once, and all that touches
+slips.
 
 - **fetiplast**: 2 ranks, everything at its default.
 - **calculix** ([calculix.py](../scripts/studies/peers/calculix.py)): 2 threads, penalty contact from surface to surface with a stick
   slope of a tenth of the penalty, one increment as for fetiplast, and the direct solver SPOOLES, for its iterative one takes
   symmetric matrices only. Elements are C3D4 and C3D8.
 
-Errors are relative to fetiplast with {fine} at level {level}: {reference}. They are mostly those of the mesh. The last column is the
-largest difference of the three numbers from those of fetiplast on the same mesh: penalties make it, and for hexahedra the element,
-which is another one.
+Errors are relative to fetiplast with {fine} at level {level}:
+{reference}. They are mostly those of the mesh. *From fetiplast's* is the largest difference of the three numbers from those of
+fetiplast on the same mesh: the penalty makes it, and for hexahedra that C3D8 is another element than hex8. Where other work ran
+beside, times are left out.
 """
 
 
@@ -91,7 +92,7 @@ def row(element, level, program, records, ours, reference):
 
 
 COLUMNS = ["", "element", "level", "seconds", "times fetiplast", *(f"error of {name}" for name in NUMBERS), "from fetiplast's"]
-COLUMNS += ["MiB", "work"]
+COLUMNS += ["MiB", "finest level"]
 
 
 def sections(found):
