@@ -103,11 +103,11 @@ class Result:
 
 
 def units_of(file):
-    """Length and stress units, if the scene's text says them in the order "length, force, stress"."""
+    """If the scene's text says them in the order "length, force, stress"."""
     text = file["provenance/scene"][()].decode() if "provenance/scene" in file else ""
     line = re.search(r'^units = "(.*)"$', text, re.MULTILINE)
     names = [name.strip() for name in line[1].split(",")] if line else []
-    return {"length": names[0], "stress": names[2]} if len(names) == 3 else {"length": "", "stress": ""}
+    return dict(zip(("length", "force", "stress"), names if len(names) == 3 else ("", "", "")))
 
 
 def add(data, name, values):

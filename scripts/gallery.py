@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Small pictures of results for the README: one field on the deformed bodies, symmetric parts completed but for a cut.
+"""Small pictures of results for the gallery: one field on the deformed bodies, symmetric parts completed but for a cut; or the
+loop of a load cycle.
 
     scripts/gallery.py [SCENE ...] --results DIR [--out docs]
 
@@ -12,11 +13,12 @@ import itertools
 import pathlib
 
 import h5py
+import hysteresis
 import numpy as np
-from accuracy import Fields
 from figures import add, bands_of, compose, edges_of, line_actor, render, surface_actor, units_of, warped
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
+from studies.curved import Fields
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkObject, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
@@ -51,6 +53,7 @@ SCENES = {
     "bolt": View("Bolted plates, pulled apart at their rim", scale=20),
     "step-42": View("A rigid ball on a cube (deal.II step-42)", scale=5, centre=(0.5, 0.5, 1.0)),
 }
+CYCLES = {"joint": hysteresis.Cycle("A bolted joint through a load cycle", "pull", (2, 4), 0.0, (0, 1, 4), copies=2)}
 
 
 class Picture:
@@ -131,24 +134,31 @@ def draw(name, path, out):
         line_actor(warped(edges_of(surface), view.scale), (0.1, 0.1, 0.1), 2.0, nearer=8),
     ]
     label += f" [{units[unit]}]" if unit and units[unit] else ""
-    large = out / f"{name}.png"
     pixels = render(actors, view.close and (view.centre, view.close))
-    compose(pixels, view.title, label, ticks, bands, f"displacements x {view.scale:g}", large)
-    image = Image.open(large).convert("RGB")
+    compose(pixels, view.title, label, ticks, bands, f"displacements x {view.scale:g}", out / f"{name}.png")
+
+
+def make_small(file):
+    image = Image.open(file).convert("RGB")
     image = image.resize((900, round(900 * image.height / image.width)), Image.LANCZOS)
-    image.quantize(128, dither=Image.Dither.NONE).save(large, optimize=True)
-    print(large, large.stat().st_size)
+    image.quantize(128, dither=Image.Dither.NONE).save(file, optimize=True)
+    print(file, file.stat().st_size)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(SCENES))
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join([*SCENES, *CYCLES]))
     parser.add_argument("--results", type=pathlib.Path, required=True)
     parser.add_argument("--out", type=pathlib.Path, default="docs")
     arguments = parser.parse_args()
     vtkObject.GlobalWarningDisplayOff()  # VTK complains about the missing X server, then renders without it.
-    for name in arguments.scenes or SCENES:
-        draw(name, arguments.results / f"{name}.vtkhdf", arguments.out)
+    for name in arguments.scenes or [*SCENES, *CYCLES]:
+        result = arguments.results / f"{name}.vtkhdf"
+        if name in CYCLES:
+            hysteresis.draw(name, CYCLES[name], result, arguments.out)
+        else:
+            draw(name, result, arguments.out)
+        make_small(arguments.out / f"{name}.png")
 
 
 if __name__ == "__main__":

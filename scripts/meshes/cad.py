@@ -21,10 +21,10 @@ def name(volumes, surfaces):
             box = gmsh.model.getBoundingBox(2, surface)
             for rule_name, holds in surfaces.items():
                 if holds(volume, box[:3], box[3:]):
-                    found.setdefault(rule_name, []).append(surface)
+                    found.setdefault(rule_name, {})[surface] = None  # Two volumes may share it.
                     break
     for number, (rule_name, tags) in enumerate(found.items(), start=1):
-        gmsh.model.addPhysicalGroup(2, tags, number, rule_name)
+        gmsh.model.addPhysicalGroup(2, list(tags), number, rule_name)
 
 
 def flat(axis, place, of=None):

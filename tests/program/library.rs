@@ -1,9 +1,10 @@
 //! The scenes with meshes from files, solved as they are or with fewer increments: against closed forms and balances.
 
 use crate::common::fields::Fields;
-use crate::common::{Run, assert_close, assert_residuals, solve, vector};
+use crate::common::{Run, assert_close, assert_residuals, number, solve, vector};
 use fetiplast::analytic::hertz::Hertz;
 use fetiplast::material::VonMises;
+use serde_json::Value;
 
 fn scene(name: &str, sets: &[&str]) -> Run {
     solve(2, &format!("{}/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR")), sets).converged()
@@ -52,6 +53,37 @@ fn forces_in_bolted_plates_balance() {
     });
     let pulls: Vec<f64> = pulls.collect();
     assert!(pulls[0] < 1e-5 && pulls[1] > 0.1, "{pulls:?}");
+}
+
+/// Where all slips, what passes is what friction bears on both faces of the upper plate. What the support puts in through a closed
+/// cycle is what friction dissipates, but for its increments.
+#[test]
+fn a_bolted_joint_slips_and_sticks_through_a_cycle() {
+    let run = scene("joint", &["step.1.increments=5", "step.2.increments=10", "step.3.increments=10"]);
+    let summary = run.summary();
+    let rows = summary["steps"].as_array().unwrap();
+    assert_eq!(rows.len(), 26);
+    let force = |row: &Value, of: &str, name: &str, axis: usize| vector(&row[of][name])[axis];
+    let passes = |row: &Value| force(row, "reactions", "pull", 0);
+    let bears =
+        |row: &Value| 0.2 * (force(row, "contact_forces", "plates", 2) + force(row, "contact_forces", "head", 2)).abs();
+    for row in rows {
+        assert_residuals(row, 1e-6);
+        assert!(passes(row).abs() < (1.0 + 1e-6) * bears(row), "{} of {}", passes(row), bears(row));
+        let [head, nut] = ["head", "nut"].map(|contact| force(row, "contact_forces", contact, 0));
+        assert!((head + nut).abs() < 1e-5 * bears(row), "{head} and {nut} on the bolt");
+    }
+    for end in [5, 15, 25] {
+        assert_close("force that slips", passes(&rows[end]).abs(), bears(&rows[end]), 1e-3);
+    }
+    let (mut area, mut dissipated) = (0.0, 0.0);
+    for k in 6..26 {
+        let moved = if k < 16 { -0.018 } else { 0.018 };
+        area += 0.5 * (passes(&rows[k - 1]) + passes(&rows[k])) * moved;
+        let contacts = rows[k]["friction"].as_object().unwrap();
+        dissipated += contacts.values().map(|contact| number(contact, "dissipation")).sum::<f64>();
+    }
+    assert_close("area of the loop", area, dissipated, 0.02);
 }
 
 /// Pressed in and released: nothing touches any more, and a dent is left where it is deepest under the nose.

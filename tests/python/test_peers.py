@@ -1,5 +1,6 @@
 """What the study `peers` says on runs that are made up, and what its programs make of a scene, without PETSc and CalculiX."""
 
+import io
 import pathlib
 import sys
 
@@ -8,9 +9,11 @@ import pytest
 
 from studies import peers
 from studies.peers import records as recorded
+from studies.peers import rubbing
 from studies.peers import scenes
 
 sys.path.insert(0, str(peers.FOLDER))
+import calculix  # noqa: E402
 import calculix_part  # noqa: E402
 import ccx  # noqa: E402
 import part  # noqa: E402
@@ -171,3 +174,31 @@ def test_times_are_not_told_of_a_busy_machine(records):
 
 def test_without_runs_of_the_scenes_nothing_is_told(records):
     assert told(records, [{**OURS, "exit_code": 1}]) == ("", "")
+
+
+def rubbed(program, element, level, force, seconds, **more):
+    made = record(program, seconds, contact_force=force, hessian_multiplications=50, **more)
+    del made["nodes"]
+    return made | {"scene": rubbing.case(element), "level": level}
+
+
+def test_programs_with_friction_stand_beside_a_fine_mesh(records):
+    fine = rubbed("fetiplast", *rubbing.FINE, [3.0, 0.0, 10.0], 90.0)
+    ours = rubbed("fetiplast", "tet4", 1, [2.7, 0.0, 10.5], 2.0, max_displacement=1.8)
+    theirs = rubbed("calculix", "tet4", 1, [2.97, 0.0, 10.5], 30.0, max_displacement=1.8, time_total=20.0, iterations=32)
+    page = "\n".join(rubbing.sections(recorded.read(records([fine, ours, theirs]))))
+    assert "trilinear hexahedra at level 5:\nnormal force 10, friction force 3, largest displacement 2." in page
+    assert "| fetiplast | tet4 | 1 | 2 | 1.00 | 5.0e-02 | 1.0e-01 | 1.0e-01 |  | 100 | 4 Newton steps, 50 applications of F |" in page
+    assert "| calculix | tet4 | 1 | 20 | 10.00 | 5.0e-02 | 1.0e-02 | 1.0e-01 | 1.0e-01 | 100 | 32 iterations |" in page
+    assert rubbing.sections(recorded.read(records([ours, theirs]))) == [], "nothing without the fine mesh"
+
+
+def test_friction_is_written_for_calculix():
+    plain, rough = io.StringIO(), io.StringIO()
+    calculix.write(plain, 1, calculix.ELEMENTS["tet4"], None)
+    calculix.write(rough, 1, calculix.ELEMENTS["hex8"], 0.3)
+    assert "*PLASTIC" in plain.getvalue() and "*FRICTION" not in plain.getvalue()
+    assert "*FRICTION\n0.3,10000\n" in rough.getvalue() and "*PLASTIC" not in rough.getvalue()
+    # One layer of 240 faces of the upper block touches, and as many lie below; 300 carry the load.
+    assert rough.getvalue().count("TYPE=C3D8") == 2 and rough.getvalue().count(",S1\n") == 240
+    assert rough.getvalue().count(",S2\n") == 240 and rough.getvalue().count(",P2,150.0\n") == 300

@@ -26,7 +26,7 @@ def program_of(record):
 
 def case_of(record):
     """Scene, and its level or thousands of nodes."""
-    return (record["scene"], record["nodes"]) if "scene" in record else ("two-blocks", record["level"])
+    return record.get("scene", "two-blocks"), record["level"] if "level" in record else record["nodes"]
 
 
 def seconds_of(record):
@@ -58,6 +58,11 @@ def ended(records):
 def no_result(program, records, ours, columns):
     least = min(map(seconds_of, records))
     return [program, f"no result after {least:.3g}", f"> {least / middle(ours, seconds_of):.0f}", *[""] * (columns - 3)]
+
+
+def timed(records, ours):
+    """Not where other work ran beside."""
+    return all(record["provenance"]["quiet"] for record in [*records, *ours])
 
 
 def middle(records, value):

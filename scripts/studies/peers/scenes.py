@@ -12,7 +12,7 @@ from ..groups import thousands
 from ..hard import TIGHT
 from ..measure import ROOT
 from ..pages import table
-from .records import EXACT, FOLDER, ONCE, OURS, PYTHON, RANKS, ended, memory_of, middle, no_result, seconds_of, spread
+from .records import EXACT, FOLDER, ONCE, OURS, PYTHON, RANKS, ended, memory_of, middle, no_result, seconds_of, spread, timed
 
 FILES = ROOT / "scenes/peers"
 
@@ -138,11 +138,6 @@ def contact_error(summary, reference):
 
 def norms(forces):
     return {name: sum(x * x for x in force) ** 0.5 for name, force in forces.items()}
-
-
-def timed(records, ours):
-    """Not where other work ran beside."""
-    return all(record["provenance"]["quiet"] for record in [*records, *ours])
 
 
 def beside(records, ours, value):
