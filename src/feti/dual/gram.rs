@@ -24,6 +24,12 @@ pub struct Gram {
     unknowns: Vec<f64>,
 }
 
+/// Pivots below this share of the diagonal are rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// By how much the diagonal grows where there is no factor.
+const SHIFTS: [f64; 3] = [1e-10, 1e-8, 1e-6];
+
 /// Product of two coefficients of one block of `W`.
 struct Product {
     /// Where it belongs in the matrix.
@@ -161,7 +167,9 @@ impl Gram {
         self.row_index.len() > self.rows.len()
     }
 
-    /// Factorises on the kept rows, `weight` being `W` between two unknowns of a block.
+    /// Factorises on the kept rows, `weight` being `W` between two unknowns of a block. Where rows depend on each other, as friction
+    /// rows do where supports hold the slave's side of many of them, the diagonal is made larger by some rounding: what this adds to
+    /// the inverse is nearly in the kernel of `B'`.
     pub fn factorise(&mut self, weight: impl Fn(SlotUnknown, SlotUnknown) -> f64, kept: impl Fn(usize) -> bool) {
         self.kept.iter_mut().zip(&self.rows).for_each(|(k, &row)| *k = kept(row));
         self.values.fill(0.0);
@@ -179,8 +187,23 @@ impl Gram {
         for (column, _) in self.kept.iter().enumerate().filter(|(_, kept)| !**kept) {
             self.values[self.column_begin[column] as usize] = 1.0;
         }
+        self.definite = self.factorises();
+        for shift in SHIFTS {
+            if self.definite {
+                break;
+            }
+            let diagonal = &self.column_begin[..self.rows.len()];
+            diagonal.iter().for_each(|&entry| self.values[entry as usize] *= 1.0 + shift);
+            self.definite = self.factorises();
+        }
+    }
+
+    /// Factorises the values. False if they are not definite, to rounding.
+    fn factorises(&mut self) -> bool {
         let lower = Lower { column_begin: &self.column_begin, rows: &self.row_index };
-        self.definite = self.workspace.factorise(&self.analysis, lower, &self.values, &mut self.factor).is_ok();
+        let diagonal = |unknown: usize| self.values[self.column_begin[unknown] as usize];
+        let found = self.workspace.factorise(&self.analysis, lower, &self.values, &mut self.factor);
+        found.is_ok() && self.analysis.least_pivot(&self.factor, diagonal) > ROUNDING
     }
 
     /// `y = (B W B')^-1 x` on its rows; zero on those that are not kept. Not a number if there is no inverse.
