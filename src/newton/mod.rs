@@ -30,6 +30,7 @@ pub mod program;
 pub mod residuals;
 pub mod response;
 pub mod snapshot;
+pub mod solution;
 pub mod step;
 
 pub use energies::Energies;

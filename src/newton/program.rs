@@ -9,6 +9,7 @@
 use super::dual::{Dual, DualFace, Multipliers, WholeDual, sliding};
 use super::forcing::Forcing;
 use super::problem::TornProblem;
+use super::solution::{DualSolution, Rest};
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::{Coarse, Floating};
 use crate::qp::feasible::FeasibleSet;
@@ -21,6 +22,9 @@ use crate::scene::Qp;
 /// Programs with given radii of friction that SMALSE-M solves at most, one after the other.
 const ROUNDS: usize = 60;
 
+/// Of a residual its projection cannot tell more than this share.
+const ROUNDING: f64 = 1e-14;
+
 /// How to solve the programs.
 #[derive(Clone, Copy, Debug)]
 pub struct ProgramSettings {
@@ -30,40 +34,6 @@ pub struct ProgramSettings {
     pub tolerance: f64,
     /// Products with the Hessian that one program may take.
     pub products: usize,
-}
-
-/// The multipliers that solve a program.
-pub struct DualSolution {
-    /// Admissible multipliers (the laws of the rows hold exactly, `G l = e` to the tolerance).
-    pub lambda: Vec<f64>,
-    /// Multipliers with `G l = e` to round-off, admissible to the tolerance.
-    pub balanced: Vec<f64>,
-    /// How it ended.
-    pub outcome: Outcome,
-    /// What it took.
-    pub statistics: Statistics,
-    /// Whether it was solved to the tolerance of the scene.
-    pub at_floor: bool,
-    /// What solving on goes on from; SMALSE-M does not.
-    pub rest: Option<Rest>,
-}
-
-/// A solution to be made more exact.
-pub struct Rest {
-    /// Multipliers with `G l = e`, zero where contacts are open.
-    start: Vec<f64>,
-    /// `d - F l`.
-    residual: Vec<f64>,
-    directions: Directions,
-    /// Products that it took so far.
-    spent: usize,
-}
-
-impl Rest {
-    /// The directions that it knows.
-    pub fn into_directions(self) -> Directions {
-        self.directions
-    }
 }
 
 /// What later programs depend on, beside the last multipliers.
@@ -194,7 +164,7 @@ impl Programs {
         let limits = Limits {
             relative: self.settings.tolerance * forcing.floor,
             reference: self.reference,
-            absolute: 0.0,
+            absolute: ROUNDING * Multipliers(problem.space, dual.timer).norm(&from.residual),
             drop: forcing.drop,
             products: self.settings.products.saturating_sub(from.spent),
         };
