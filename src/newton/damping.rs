@@ -24,6 +24,13 @@ struct Cost<'p, 'a> {
     radii: &'p Radii,
 }
 
+impl TornProblem<'_> {
+    /// The largest residual after a step to these multipliers. Collective.
+    pub(super) fn residual(&self, to: &Damped, lambda: &[f64]) -> f64 {
+        self.residuals(&to.u, &to.state, lambda).largest()
+    }
+}
+
 impl Cost<'_, '_> {
     fn of(&self, u: &Torn, state: &State) -> f64 {
         if !self.problem.constraints.has_friction {
@@ -54,15 +61,18 @@ pub struct Damped {
     pub length: f64,
 }
 
-/// Searches from `u` along `du`, with these radii of friction. `None` if no length lowers the energy. Where `u` is not `admissible` the energies
-/// cannot be compared and the full step is taken.
+/// Searches from `u` along `du`, with these radii of friction. Where `u` is not `admissible` the energies cannot be compared and the
+/// full step is taken.
+///
+/// # Errors
+/// The full step if no length lowers the energy.
 pub fn search(
     problem: &TornProblem,
     (u, state): (&Torn, &State),
     (du, radii): (&Torn, &Radii),
     admissible: bool,
     timer: &Timer,
-) -> Option<Damped> {
+) -> Result<Damped, Damped> {
     let cost = Cost { problem, radii };
     let trial = |length: f64| {
         timer.time("internal forces", || {
@@ -77,7 +87,7 @@ pub fn search(
     };
     let full = trial(1.0);
     if !admissible {
-        return Some(full);
+        return Ok(full);
     }
     let (first_slope, before) = (cost.slope(u, state, du), cost.of(u, state));
     // Round-off in the difference of two energies.
@@ -87,7 +97,7 @@ pub fn search(
         + cancelled * (cancelled + 2.0 * state.internal_energy.abs().sqrt());
     let lowers = |t: &Damped| cost.of(&t.u, &t.state) <= before + SUFFICIENT * t.length * first_slope.min(0.0) + noise;
     if lowers(&full) {
-        return Some(full);
+        return Ok(full);
     }
     // Illinois: the slope changes its sign between low and high, (length, slope) each.
     let mut low = (0.0, first_slope);
@@ -98,10 +108,10 @@ pub fn search(
         let next = trial(length);
         let slope = cost.slope(&next.u, &next.state, du);
         if lowers(&next) && slope.abs() <= FLAT * first_slope.abs() {
-            return Some(next);
+            return Ok(next);
         }
         if slope.is_nan() {
-            return None;
+            return Err(full);
         }
         if slope < 0.0 {
             low = (length, slope);
@@ -111,5 +121,5 @@ pub fn search(
             low.1 *= 0.5;
         }
     }
-    None
+    Err(full)
 }

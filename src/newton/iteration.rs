@@ -253,10 +253,16 @@ impl<'a> Newton<'a> {
         // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
         let radii = problem.radii(&step.lambda);
         match damping::search(problem, (&iterate.u, &iterate.state), (&step.du, &radii), self.admissible, timer) {
-            Some(damped) => Trial::Accepted(step, damped),
-            None if !iterate.state.energy.is_finite() => Trial::Ended(Outcome::NotFinite),
-            None if refused.len() >= TRIALS => Trial::Ended(Outcome::Stalled),
-            None => {
+            Ok(damped) => Trial::Accepted(step, damped),
+            Err(_) if !iterate.state.energy.is_finite() => Trial::Ended(Outcome::NotFinite),
+            // With friction energies depend on radii, which are as exact as the program. Near the solution residuals tell more.
+            Err(full)
+                if problem.has_friction() && problem.residual(&full, &step.lambda) < iterate.residuals.largest() =>
+            {
+                Trial::Accepted(step, full)
+            }
+            Err(_) if refused.len() >= TRIALS => Trial::Ended(Outcome::Stalled),
+            Err(_) => {
                 // Perhaps the program was solved too loosely for a descent direction.
                 forcing.tighten();
                 solver.sharpen();
