@@ -14,7 +14,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::iteration::Newton;
-use super::problem::{State, TornProblem};
+use super::problem::{SIGNIFICANT, State, TornProblem};
 use super::residuals::relative;
 use crate::assembly::internal;
 use crate::constraint::Kind;
@@ -35,7 +35,7 @@ pub struct Energies {
     pub friction: f64,
     /// What contact takes besides, since an increment has a size: where gaps close, and where friction grows.
     pub closing: f64,
-    /// Sum of the sizes of all these parts.
+    /// Sum of the sizes of all these parts; at least a share of the terms that energies are sums of, where bodies move without strain.
     gross: f64,
 }
 
@@ -54,8 +54,8 @@ impl Energies {
         relative(missing.abs(), self.gross)
     }
 
-    /// This and the work of another increment.
-    fn and(&self, [external, stored, plastic, friction, closing]: [f64; 5]) -> Self {
+    /// This and the parts of another increment; relative errors refer to the `least` size or more.
+    fn and(&self, [external, stored, plastic, friction, closing]: [f64; 5], least: f64) -> Self {
         let parts = [external, stored, plastic, friction, closing];
         Self {
             external: self.external + external,
@@ -63,7 +63,7 @@ impl Energies {
             plastic: self.plastic + plastic,
             friction: self.friction + friction,
             closing: self.closing + closing,
-            gross: self.gross + parts.iter().map(|part| part.abs()).sum::<f64>(),
+            gross: (self.gross + parts.iter().map(|part| part.abs()).sum::<f64>()).max(least),
         }
     }
 }
@@ -81,7 +81,7 @@ impl Newton<'_> {
         let begin =
             End { u: &u, state: &problem.evaluate(&u), lambda: &lambda, conditions: &self.path.before(self.attempt) };
         let end = End { u: &iterate.u, state: &iterate.state, lambda: &iterate.lambda, conditions: &now };
-        Some(before.and(problem.increment_of_work(&begin, &end)))
+        Some(before.and(problem.increment_of_work(&begin, &end), SIGNIFICANT * iterate.state.terms.energy))
     }
 }
 

@@ -33,5 +33,6 @@ mod refined;
 mod results;
 mod rigid;
 mod ring;
+mod rubbing;
 mod twins;
 mod verify;

@@ -57,7 +57,10 @@ impl Run {
         assert!(balance <= 10.0 * residual + 1e-9, "{balance:.1e} is out of balance, the residual is {residual:.1e}");
         // Where energies are known: they are products of forces out of balance and displacements.
         let energies = summary["residual_energies"].as_f64().unwrap_or_default();
-        assert!(energies <= 100.0 * residual + 1e-9, "{energies:.1e} of energies are missing, the residual is {residual:.1e}");
+        assert!(
+            energies <= 100.0 * residual + 1e-9,
+            "{energies:.1e} of energies are missing, the residual is {residual:.1e}"
+        );
         self
     }
 }

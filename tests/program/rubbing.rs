@@ -1,0 +1,163 @@
+//! Hard cases of friction between bodies: strong and weak, on any elements and meshes, through a reversal of the load.
+
+use crate::common::{assert_close, assert_near, number, run_briefly, scene_file, solve, solve_tightly, vector};
+use serde_json::Value;
+
+/// A block that is pressed onto a larger one, pushed along x and pulled back; along y nothing but friction holds it. `turned` names
+/// the axes that x and y become, with a sign.
+fn blocks(turned: [(usize, f64); 2]) -> String {
+    let place = |[x, y, z]: [f64; 3]| {
+        let mut placed = [0.0, 0.0, z];
+        turned.iter().zip([x, y]).for_each(|((axis, sign), value)| placed[*axis] = sign * value);
+        placed
+    };
+    let brick = |low: [f64; 3], high: [f64; 3], cells: [usize; 3]| {
+        let (a, b) = (place(low), place(high));
+        let origin: [f64; 3] = std::array::from_fn(|k| a[k].min(b[k]));
+        let size: [f64; 3] = std::array::from_fn(|k| (b[k] - a[k]).abs());
+        let mut turned_cells = cells;
+        turned.iter().zip(cells).for_each(|((axis, _), n)| turned_cells[*axis] = n);
+        format!("{{ origin = {origin:?}, size = {size:?}, cells = {turned_cells:?} }}")
+    };
+    let along = ["x", "y"][turned[0].0];
+    format!(
+        r#"
+        material.low = {{ young = 210000.0, poisson = 0.3 }}
+        material.high = {{ young = 210000.0, poisson = 0.3 }}
+        [body.low]
+        material = "low"
+        element = "hex8"
+        brick = {}
+        [body.high]
+        material = "high"
+        element = "hex8"
+        brick = {}
+        [support]
+        bottom = {{ surface = "low.zmin", fix = ["x", "y", "z"] }}
+        press = {{ surface = "high.zmax", fix = ["z"], displacement = [0.0, 0.0, -0.05] }}
+        push = {{ surface = "high.zmax", fix = ["{along}"], displacement = {:?} }}
+        [contact.joint]
+        slave = "high.zmin"
+        master = "low.zmax"
+        friction = 0.3
+        [[step]]
+        support = {{ press = 1.0, push = 0.0 }}
+        [[step]]
+        support = {{ press = 1.0, push = 1.0 }}
+        increments = 2
+        [[step]]
+        support = {{ press = 1.0, push = -1.0 }}
+        increments = 2
+        [decomposition]
+        cells = [2, 2, 3]
+        "#,
+        brick([0.0, 0.0, 0.0], [100.0, 100.0, 40.0], [8, 8, 3]),
+        brick([25.0, 25.0, 40.0], [75.0, 75.0, 80.0], [4, 4, 3]),
+        place([0.06, 0.0, 0.0]),
+    )
+}
+
+/// As it stands.
+const STRAIGHT: [(usize, f64); 2] = [(0, 1.0), (1, 1.0)];
+
+/// Checks each increment: the law holds, energies balance, friction takes energy, and no more than the law allows is held.
+fn assert_sound(summary: &Value, friction: f64, name: &str) {
+    for step in summary["steps"].as_array().expect("increments") {
+        assert!(number(step, "residual_friction") < 1e-6, "{name}: {step}");
+        assert!(number(step, "residual_energies") < 1e-5, "{name}: {step}");
+        let rubbed = &step["friction"]["joint"];
+        let [dissipation, external] =
+            [&rubbed["dissipation"], &step["energies"]["external"]].map(|of| of.as_f64().unwrap());
+        assert!(dissipation >= -1e-6 * external.abs(), "{name}: {rubbed}");
+        let [x, y, z] = vector(&step["contact_force"]);
+        assert!(z >= 0.0 && x.hypot(y) <= friction * z * (1.0 + 1e-6), "{name}: {x} {y} {z}");
+    }
+}
+
+#[test]
+fn friction_of_any_strength_holds_its_law_on_any_bodies() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), &blocks(STRAIGHT));
+    let perfect = ["material.low.yield_stress=150.0", "material.low.hardening=0.0"];
+    let soft = ["material.high.poisson=0.499", "material.high.young=10.0"];
+    let quadratic = ["body.low.element=\"tet10\"", "body.high.element=\"tet10\""];
+    let linear = ["body.low.element=\"tet4\"", "body.high.element=\"tet4\""];
+    let other_meshes = ["body.high.brick.cells=[6, 6, 3]", "body.high.brick.origin=[20.0, 25.0, 40.0]"];
+    let parts = ["decomposition.method=\"metis\"", "decomposition.subdomains=7"];
+    let cases: [(f64, &[&str]); 12] = [
+        (1e-6, &[]),
+        (0.1, &[]),
+        (0.6, &[]),
+        (1.0, &parts),
+        (0.3, &["material.low.young=1e11"]),
+        (0.3, &["material.high.young=1e11"]),
+        (0.3, &soft),
+        (0.3, &perfect),
+        (0.8, &perfect),
+        (0.3, &quadratic),
+        (0.5, &linear),
+        (0.3, &other_meshes),
+    ];
+    for (friction, more) in cases {
+        let law = format!("contact.joint.friction={friction}");
+        let sets: Vec<&str> = [law.as_str()].into_iter().chain(more.iter().copied()).collect();
+        let summary = solve(1, &scene, &sets).converged().summary();
+        let name = sets.join(" ");
+        assert_sound(&summary, friction, &name);
+        assert_eq!(summary["smalse_iterations"], 0, "{name}: sets of contact come back");
+        assert_eq!(summary["steps"].as_array().unwrap().len(), 5, "{name}: no increment is halved");
+    }
+}
+
+#[test]
+fn turned_and_mirrored_scenes_agree() {
+    let directory = tempfile::tempdir().unwrap();
+    let found = |turned: [(usize, f64); 2]| {
+        let summary = solve_tightly(1, &scene_file(directory.path(), &blocks(turned)), &[]).summary();
+        let force = vector(&summary["contact_force"]);
+        let back = |k: usize| turned[k].1 * force[turned[k].0];
+        (summary["energies"].clone(), [back(0), back(1), force[2]])
+    };
+    let (energies, force) = found(STRAIGHT);
+    for turned in [[(0, -1.0), (1, 1.0)], [(1, 1.0), (0, -1.0)], [(1, -1.0), (0, -1.0)]] {
+        let (other, turned_force) = found(turned);
+        assert_near(&format!("{turned:?}"), turned_force, force, 1e-9);
+        for name in ["external", "stored", "friction"] {
+            let [a, b] = [&energies, &other].map(|energies| energies[name].as_f64().unwrap());
+            assert_close(name, b, a, 1e-9);
+        }
+    }
+}
+
+#[test]
+fn strong_friction_sticks_everywhere_and_weak_friction_nowhere() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), &blocks(STRAIGHT));
+    let counts = |law: &str| {
+        let rubbed = solve(2, &scene, &[law]).converged().summary()["friction"]["joint"].clone();
+        [&rubbed["sticking"], &rubbed["slipping"]].map(|count| count.as_u64().unwrap())
+    };
+    assert_eq!(counts("contact.joint.friction=10.0"), [25, 0]);
+    assert_eq!(counts("contact.joint.friction=0.05"), [0, 25]);
+}
+
+/// Where nothing presses, surfaces do not rub: bodies move as they are told, free of stress, and soon.
+#[test]
+fn without_pressure_there_is_no_friction() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), &blocks(STRAIGHT));
+    let touching = ["step.0.support.press=0.0", "step.1.support.press=0.0", "step.2.support.press=0.0"];
+    let held = [&touching[..], &["support.push.fix=[\"x\", \"y\"]"]].concat();
+    let summary = solve(1, &scene, &held).converged().summary();
+    assert!(number(&summary, "max_von_mises") < 1e-5, "{}", summary["max_von_mises"]);
+    assert!(number(&summary, "hessian_multiplications") < 300.0, "{}", summary["hessian_multiplications"]);
+    // A load along y is borne by friction where the block is pressed, and by nothing where it is not.
+    let pulled = scene_file(
+        directory.path(),
+        &(blocks(STRAIGHT) + "\n[load.pull]\nbody = \"high\"\nbody_force = [0.0, 1e-3, 0.0]\n"),
+    );
+    solve(1, &pulled, &[]).converged();
+    let lifted = ["solve", &pulled, "--set", "support.press.displacement=[0.0, 0.0, 0.05]"];
+    let run = run_briefly(2, &lifted);
+    assert_ne!(run.code, 0, "nothing holds the block along y: {}", run.stdout);
+}
