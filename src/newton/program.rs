@@ -161,10 +161,13 @@ impl Programs {
         from: Rest,
         forcing: Forcing,
     ) -> Result<DualSolution, Floating> {
+        // Where all residuals so far are rounding, bodies move without strain.
+        let rounding = ROUNDING * Multipliers(problem.space, dual.timer).norm(&from.residual);
+        let is_strained = self.reference.is_some_and(|reference| reference > rounding);
         let limits = Limits {
             relative: self.settings.tolerance * forcing.floor,
             reference: self.reference,
-            absolute: ROUNDING * Multipliers(problem.space, dual.timer).norm(&from.residual),
+            absolute: if is_strained { 0.0 } else { rounding },
             drop: forcing.drop,
             products: self.settings.products.saturating_sub(from.spent),
         };

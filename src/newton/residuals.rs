@@ -88,14 +88,19 @@ impl TornProblem<'_> {
         let force_square = squares[1].max(squares[2]);
         let before = &self.committed.sizes;
         let size = larger(before.displacement, displacement);
+        let pressed = larger(larger(before.contact_force, contact_force), terms);
         let residuals = Residuals {
             equilibrium: relative(squares[0].sqrt(), force_square.max(before.force_square).sqrt().max(terms)),
             gluing: relative(glue, size),
             gap: relative(gap, size),
-            complementarity: relative(product, larger(before.contact_force, contact_force) * size),
-            friction: self.friction_residual(&slack, lambda, (larger(before.contact_force, contact_force), size)),
+            complementarity: relative(product, pressed * size),
+            friction: self.friction_residual(&slack, lambda, (pressed, size)),
         };
-        (residuals, Sizes { elastic_norm: 0.0, force_square, displacement, contact_force })
+        let force_square = force_square.max(terms * terms);
+        (
+            residuals,
+            Sizes { elastic_norm: 0.0, force_square, displacement, contact_force: larger(contact_force, terms) },
+        )
     }
 
     /// `f - F(u) - B_I'lambda_I`, torn: after adding up copies, minus the reactions.
