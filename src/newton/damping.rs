@@ -72,7 +72,7 @@ pub fn search(
     (du, radii): (&Torn, &Radii),
     admissible: bool,
     timer: &Timer,
-) -> Result<Damped, Damped> {
+) -> Result<Damped, Box<Damped>> {
     let cost = Cost { problem, radii };
     let trial = |length: f64| {
         timer.time("internal forces", || {
@@ -111,7 +111,7 @@ pub fn search(
             return Ok(next);
         }
         if slope.is_nan() {
-            return Err(full);
+            return Err(Box::new(full));
         }
         if slope < 0.0 {
             low = (length, slope);
@@ -121,5 +121,5 @@ pub fn search(
             low.1 *= 0.5;
         }
     }
-    Err(full)
+    Err(Box::new(full))
 }

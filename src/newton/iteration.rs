@@ -259,7 +259,7 @@ impl<'a> Newton<'a> {
             Err(full)
                 if problem.has_friction() && problem.residual(&full, &step.lambda) < iterate.residuals.largest() =>
             {
-                Trial::Accepted(step, full)
+                Trial::Accepted(step, *full)
             }
             Err(_) if refused.len() >= TRIALS => Trial::Ended(Outcome::Stalled),
             Err(_) => {
