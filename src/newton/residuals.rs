@@ -88,7 +88,7 @@ impl TornProblem<'_> {
         let force_square = squares[1].max(squares[2]);
         let before = &self.committed.sizes;
         let size = larger(before.displacement, displacement);
-        let pressed = larger(larger(before.contact_force, contact_force), terms);
+        let pressed = larger(before.contact_force, contact_force);
         let residuals = Residuals {
             equilibrium: relative(squares[0].sqrt(), force_square.max(before.force_square).sqrt().max(terms)),
             gluing: relative(glue, size),
@@ -97,10 +97,7 @@ impl TornProblem<'_> {
             friction: self.friction_residual(&slack, lambda, (pressed, size)),
         };
         let force_square = force_square.max(terms * terms);
-        (
-            residuals,
-            Sizes { elastic_norm: 0.0, force_square, displacement, contact_force: larger(contact_force, terms) },
-        )
+        (residuals, Sizes { elastic_norm: 0.0, force_square, displacement, contact_force })
     }
 
     /// `f - F(u) - B_I'lambda_I`, torn: after adding up copies, minus the reactions.
