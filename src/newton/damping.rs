@@ -24,30 +24,26 @@ struct Cost<'p, 'a> {
     radii: &'p Radii,
 }
 
-impl TornProblem<'_> {
-    /// The largest residual after a step to these multipliers. Collective.
-    pub(super) fn residual(&self, to: &Damped, lambda: &[f64]) -> f64 {
-        self.residuals(&to.u, &to.state, lambda).largest()
-    }
-}
-
 impl Cost<'_, '_> {
-    fn of(&self, u: &Torn, state: &State) -> f64 {
-        if !self.problem.constraints.has_friction {
-            return state.energy;
-        }
-        state.energy + self.problem.dissipation(self.radii, &self.problem.slack(u))
+    /// The slack of a displacement; nothing without friction, where nobody asks for it.
+    fn slack(&self, u: &Torn) -> Vec<f64> {
+        if self.problem.constraints.has_friction { self.problem.slack(u) } else { Vec::new() }
     }
 
-    /// Its slope at `u` along `du`.
-    fn slope(&self, u: &Torn, state: &State, du: &Torn) -> f64 {
+    /// At a displacement with this slack.
+    fn of(&self, state: &State, slack: &[f64]) -> f64 {
+        state.energy + self.problem.dissipation(self.radii, slack)
+    }
+
+    /// Its slope there along `du`.
+    fn slope(&self, state: &State, slack: &[f64], du: &Torn) -> f64 {
         let slope = self.problem.slope(state, du);
         if !self.problem.constraints.has_friction {
             return slope;
         }
         let mut change = vec![0.0; self.problem.gather.rows()];
         self.problem.gather.apply(du, &mut change);
-        slope + self.problem.dissipation_slope(self.radii, &self.problem.slack(u), &change)
+        slope + self.problem.dissipation_slope(self.radii, slack, &change)
     }
 }
 
@@ -89,25 +85,30 @@ pub fn search(
     if !admissible {
         return Ok(full);
     }
-    let (first_slope, before) = (cost.slope(u, state, du), cost.of(u, state));
+    let slack = cost.slack(u);
+    let (first_slope, before) = (cost.slope(state, &slack, du), cost.of(state, &slack));
     // Round-off in the difference of two energies.
     let cancelled = ROUNDING * full.state.terms.energy.sqrt();
     let noise = 1e-12
         * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs())
         + cancelled * (cancelled + 2.0 * state.internal_energy.abs().sqrt());
-    let lowers = |t: &Damped| cost.of(&t.u, &t.state) <= before + SUFFICIENT * t.length * first_slope.min(0.0) + noise;
-    if lowers(&full) {
+    let lowers = |t: &Damped, slack: &[f64]| {
+        cost.of(&t.state, slack) <= before + SUFFICIENT * t.length * first_slope.min(0.0) + noise
+    };
+    let slack = cost.slack(&full.u);
+    if lowers(&full, &slack) {
         return Ok(full);
     }
     // Illinois: the slope changes its sign between low and high, (length, slope) each.
     let mut low = (0.0, first_slope);
-    let mut high = (1.0, cost.slope(&full.u, &full.state, du));
+    let mut high = (1.0, cost.slope(&full.state, &slack, du));
     for _ in 0..TRIALS {
         let inside = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
         let length = if inside > low.0 && inside < high.0 { inside } else { 0.5 * (low.0 + high.0) };
         let next = trial(length);
-        let slope = cost.slope(&next.u, &next.state, du);
-        if lowers(&next) && slope.abs() <= FLAT * first_slope.abs() {
+        let slack = cost.slack(&next.u);
+        let slope = cost.slope(&next.state, &slack, du);
+        if lowers(&next, &slack) && slope.abs() <= FLAT * first_slope.abs() {
             return Ok(next);
         }
         if slope.is_nan() {

@@ -13,28 +13,23 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::iterate::Iterate;
 use super::iteration::Newton;
 use super::problem::{SIGNIFICANT, State, TornProblem};
 use super::residuals::relative;
+use super::snapshot::Reached;
 use crate::assembly::internal;
 use crate::constraint::Kind;
 use crate::feti::Torn;
 use crate::model::history::Conditions;
+use crate::record::state::Energies as Parts;
 use crate::vector::dot;
 
 /// Energies since the beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energies {
-    /// Work of loads, supports and moving obstacles.
-    pub external: f64,
-    /// Elastic energy.
-    pub stored: f64,
-    /// Plastic work: what flow dissipates, and what hardening stores.
-    pub plastic: f64,
-    /// What friction dissipates.
-    pub friction: f64,
-    /// What contact takes besides, since an increment has a size: where gaps close, and where friction grows.
-    pub closing: f64,
+    /// What they are.
+    pub parts: Parts,
     /// Sum of the sizes of all these parts; at least a share of the terms that energies are sums of, where bodies move without strain.
     gross: f64,
 }
@@ -44,27 +39,28 @@ struct End<'e> {
     u: &'e Torn,
     state: &'e State,
     lambda: &'e [f64],
-    conditions: &'e Conditions,
+    loads: &'e Torn,
+    rhs: &'e [f64],
 }
 
 impl Energies {
     /// What is missing, relative to the sizes of all parts.
     pub fn imbalance(&self) -> f64 {
-        let missing = self.external - self.stored - self.plastic - self.friction - self.closing;
-        relative(missing.abs(), self.gross)
+        let Parts { external, stored, plastic, friction, closing } = self.parts;
+        relative((external - stored - plastic - friction - closing).abs(), self.gross)
     }
 
     /// This and the parts of another increment; relative errors refer to the `least` size or more.
-    fn and(&self, [external, stored, plastic, friction, closing]: [f64; 5], least: f64) -> Self {
-        let parts = [external, stored, plastic, friction, closing];
-        Self {
-            external: self.external + external,
-            stored: self.stored + stored,
-            plastic: self.plastic + plastic,
-            friction: self.friction + friction,
-            closing: self.closing + closing,
-            gross: (self.gross + parts.iter().map(|part| part.abs()).sum::<f64>()).max(least),
-        }
+    fn and(&self, of: Parts, least: f64) -> Self {
+        let sizes = [of.external, of.stored, of.plastic, of.friction, of.closing].map(f64::abs);
+        let parts = Parts {
+            external: self.parts.external + of.external,
+            stored: self.parts.stored + of.stored,
+            plastic: self.parts.plastic + of.plastic,
+            friction: self.parts.friction + of.friction,
+            closing: self.parts.closing + of.closing,
+        };
+        Self { parts, gross: (self.gross + sizes.iter().sum::<f64>()).max(least) }
     }
 }
 
@@ -72,29 +68,33 @@ impl Newton<'_> {
     /// Those up to the iterate, where this is an equilibrium. Unknown where a history goes on from a result, and
     /// where loads follow the work they do. Collective.
     pub(super) fn energies(&self) -> Option<Energies> {
-        let (problem, iterate) = (&self.problem, &self.iterate);
+        let (problem, Iterate { u, state, lambda, .. }) = (&self.problem, &self.iterate);
         let before = problem.committed.energies.filter(|_| self.control.is_none())?;
-        let rest = || (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
-        let (u, lambda) = self.reached.as_ref().map_or_else(rest, |end| (end.u.clone(), end.lambda.clone()));
-        let TornProblem { loads, rhs, friction, .. } = problem;
-        let now = Conditions { loads: loads.clone(), rhs: rhs.clone(), friction: friction.clone() };
-        let begin =
-            End { u: &u, state: &problem.evaluate(&u), lambda: &lambda, conditions: &self.path.before(self.attempt) };
-        let end = End { u: &iterate.u, state: &iterate.state, lambda: &iterate.lambda, conditions: &now };
-        Some(before.and(problem.increment_of_work(&begin, &end), SIGNIFICANT * iterate.state.terms.energy))
+        let rest;
+        let from = match &self.reached {
+            Some(reached) => reached,
+            None => {
+                rest = Reached { u: problem.gather.zeros(), lambda: vec![0.0; problem.gather.rows()] };
+                &rest
+            }
+        };
+        let Conditions { loads, rhs, .. } = self.path.before(self.attempt);
+        let state_before = problem.evaluate(&from.u);
+        let begin = End { u: &from.u, state: &state_before, lambda: &from.lambda, loads: &loads, rhs: &rhs };
+        let end = End { u, state, lambda, loads: &problem.loads, rhs: &problem.rhs };
+        Some(before.and(problem.increment_of_work(&begin, &end), SIGNIFICANT * state.terms.energy))
     }
 }
 
 impl TornProblem<'_> {
-    /// The parts of the work of an increment, in the order of [`Energies`]. Three collectives and some neighbour exchanges.
-    fn increment_of_work(&self, begin: &End, end: &End) -> [f64; 5] {
+    /// The parts of the work of an increment. Three collectives and some neighbour exchanges.
+    fn increment_of_work(&self, begin: &End, end: &End) -> Parts {
         // Loads by nodes; stored and plastic work by elements.
         let mut change = end.u.clone();
         change.iter_mut().flatten().zip(begin.u.iter().flatten()).for_each(|(u, before)| *u -= before);
         let mut partial = Vec::with_capacity(3 * change.len());
         for (own, region) in self.regions().iter().enumerate() {
-            let of_loads =
-                dot(&begin.conditions.loads[own], &change[own]) + dot(&end.conditions.loads[own], &change[own]);
+            let of_loads = dot(&begin.loads[own], &change[own]) + dot(&end.loads[own], &change[own]);
             let [stored, plastic] = internal::work(region, [&begin.u[own], &end.u[own]]);
             partial.extend([0.5 * of_loads, stored, plastic]);
         }
@@ -108,20 +108,25 @@ impl TornProblem<'_> {
         let contacts = [begin, end].map(|at| self.of_contact(at.lambda));
         let mean = |[a, b]: &[Vec<f64>; 2]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect() };
         let (supports, pressed) = (mean(&supports), mean(&contacts));
-        let given: Vec<f64> =
-            end.conditions.rhs.iter().zip(&begin.conditions.rhs).map(|(c, before)| c - before).collect();
+        let given: Vec<f64> = end.rhs.iter().zip(begin.rhs).map(|(c, before)| c - before).collect();
         let beside: Vec<f64> = moved.iter().zip(&given).map(|(moved, given)| moved - given).collect();
         let mut rubs = vec![0.0; self.gather.rows()];
         let tangents = self.constraints.sliders.iter().flat_map(|slider| &slider.tangents);
         tangents.for_each(|tangent| rubs[tangent.row] = end.lambda[tangent.row]);
         let pairs = [(&supports[..], &moved[..]), (&pressed, &given), (&pressed, &beside), (&rubs, &beside)];
         let [held, dragged, contact, friction] = self.space.dots(&pairs)[..] else { unreachable!("four products") };
-        [sums[0] - held - dragged, sums[1], sums[2], friction, contact - friction]
+        Parts {
+            external: sums[0] - held - dragged,
+            stored: sums[1],
+            plastic: sums[2],
+            friction,
+            closing: contact - friction,
+        }
     }
 
     /// `f - F(u) - B_I'lambda_I` at an end.
     fn off_balance(&self, at: &End) -> Torn {
-        let mut left = at.conditions.loads.clone();
+        let mut left = at.loads.clone();
         left.iter_mut().flatten().zip(at.state.forces.iter().flatten()).for_each(|(f, internal)| *f -= internal);
         self.gather.add_transpose(-1.0, &self.of_contact(at.lambda), &mut left);
         left

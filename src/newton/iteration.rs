@@ -257,7 +257,9 @@ impl<'a> Newton<'a> {
             Err(_) if !iterate.state.energy.is_finite() => Trial::Ended(Outcome::NotFinite),
             // With friction energies depend on radii, which are as exact as the program. Near the solution residuals tell more.
             Err(full)
-                if problem.has_friction() && problem.residual(&full, &step.lambda) < iterate.residuals.largest() =>
+                if problem.has_friction()
+                    && problem.residuals(&full.u, &full.state, &step.lambda).largest()
+                        < iterate.residuals.largest() =>
             {
                 Trial::Accepted(step, *full)
             }
