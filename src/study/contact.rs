@@ -47,13 +47,12 @@ pub fn fields(subdomains: &[Subdomain], touching: &Contacts, states: &[ContactSt
         parts.fold(AtNodes::nothing(0), AtNodes::and)
     };
     let AtNodes { pressure, gap, status } = of(&|_| true);
-    let rubs = states.iter().any(|state| state.friction.is_some()) || touching.has_friction;
     let mut fields = vec![
         Field::scalar("contact_pressure", pressure),
         Field::scalar("contact_gap", gap),
         Field::integer("contact_status", status),
     ];
-    if rubs {
+    if touching.has_friction {
         let [traction, slip]: [Vec<[f64; 3]>; 2] = std::array::from_fn(|which| {
             subdomains.iter().flat_map(|subdomain| known.vectors(subdomain, which)).collect()
         });
@@ -104,6 +103,18 @@ impl<'a> Known<'a> {
         Self { nodes, slaves, masters, pressures, rubbed }
     }
 
+    /// The conditions of a node on slave surfaces.
+    fn slaves_at(&self, node: u64) -> impl Iterator<Item = &(u64, usize, &'a ContactState)> {
+        let first = self.slaves.partition_point(|(known, ..)| *known < node);
+        self.slaves[first..].iter().take_while(move |(known, ..)| *known == node)
+    }
+
+    /// What a node on master surfaces meets.
+    fn masters_at(&self, node: u64) -> impl Iterator<Item = &&'a MasterNode> {
+        let first = self.masters.partition_point(|master| master.node < node);
+        self.masters[first..].iter().take_while(move |master| master.node == node)
+    }
+
     /// Pressure of a condition; zero where its row is on other ranks.
     fn pressure(&self, pair: usize) -> f64 {
         self.pressures.get(&pair).copied().unwrap_or_default()
@@ -118,12 +129,9 @@ impl<'a> Known<'a> {
             found[local].iter_mut().zip(of).for_each(|(sum, x)| *sum += factor * x);
         };
         for (local, &node) in subdomain.nodes.iter().enumerate() {
-            let slaves = &self.slaves[self.slaves.partition_point(|(known, ..)| *known < node)..];
-            let slaves = slaves.iter().take_while(|(known, ..)| *known == node);
-            slaves.for_each(|(.., state)| add(local, 1.0, state.pair));
-            let masters = &self.masters[self.masters.partition_point(|master| master.node < node)..];
-            let masters = masters.iter().take_while(|master| master.node == node);
-            masters.flat_map(|master| &master.pairs).for_each(|&(pair, weight)| add(local, -weight, pair));
+            self.slaves_at(node).for_each(|(.., state)| add(local, 1.0, state.pair));
+            let opposite = self.masters_at(node).flat_map(|master| &master.pairs);
+            opposite.for_each(|&(pair, weight)| add(local, -weight, pair));
         }
         found
     }
@@ -134,17 +142,13 @@ impl<'a> Known<'a> {
         // Copies of a node show the same, also where a subdomain has no face of the surface.
         let touches = |(_, node): &(usize, &u64)| self.nodes.binary_search(node).is_ok();
         for (local, &node) in subdomain.nodes.iter().enumerate().filter(touches) {
-            let slaves = &self.slaves[self.slaves.partition_point(|(known, ..)| *known < node)..];
-            let slaves = slaves.iter().take_while(|(known, ..)| *known == node);
-            for (.., state) in slaves.filter(|(_, contact, _)| wanted(*contact)) {
+            for (.., state) in self.slaves_at(node).filter(|(_, contact, _)| wanted(*contact)) {
                 found.pressure[local] = found.pressure[local].max(self.pressure(state.pair));
                 // `min` takes the number of a number and none.
                 found.gap[local] = state.gap.min(found.gap[local]);
                 found.status[local] = found.status[local].max(state.status as i64);
             }
-            let masters = &self.masters[self.masters.partition_point(|master| master.node < node)..];
-            let masters = masters.iter().take_while(|master| master.node == node);
-            for master in masters.filter(|master| wanted(master.contact)) {
+            for master in self.masters_at(node).filter(|master| wanted(master.contact)) {
                 let mean = master.pairs.iter().map(|&(pair, weight)| weight * self.pressure(pair)).sum();
                 found.pressure[local] = found.pressure[local].max(mean);
             }

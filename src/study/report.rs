@@ -16,7 +16,7 @@ use crate::newton::path::At;
 use crate::newton::{self, Iterate, Newton, StepRecord, TornProblem};
 use crate::record::counts::{ContactRow, Counters};
 use crate::record::rows::{LimitLoad, NewtonRow, StepRow};
-use crate::record::state::{Acting, Energies, Errors, Measures, Residuals, Rubbed, State};
+use crate::record::state::{Acting, Errors, Measures, Residuals, Rubbed, State};
 use crate::record::summary::Summary;
 use crate::scene::{self, Friction, Scene};
 use crate::sizing::sizes::sizes;
@@ -135,39 +135,26 @@ fn friction(
     discrete: &Discrete,
     (contact, size): (&[ContactState], f64),
 ) -> BTreeMap<String, Rubbed> {
-    let Contacts { names, pairs, .. } = &discrete.contacts;
     if !problem.constraints.has_friction {
         return BTreeMap::new();
     }
+    let pairs = &discrete.contacts.pairs;
     let signs = signs(scene, discrete);
-    let of_pair: HashMap<usize, Rubbing> =
-        contact.iter().filter_map(|state| Some((state.pair, state.friction?))).collect();
-    let pressed: HashMap<usize, f64> = contact.iter().map(|state| (state.pair, state.force)).collect();
-    let mut partial = Vec::new();
-    for rows in problem.space.owned() {
-        let mut sums = vec![[0.0; 6]; names.len()];
-        for row in rows.clone() {
-            let Kind::Contact { pair } = problem.constraints.rows[row].kind else { continue };
-            let Some(rubbing) = of_pair.get(&pair) else { continue };
-            let acts = rubbing.limit > 0.0 && (rubbing.is_given || pressed[&pair] > 0.0);
-            let slips = acts && rubbing.status(size) == Status::Slip;
-            let sum = &mut sums[pairs[pair].contact];
-            let sign = signs[pairs[pair].contact];
-            sum.iter_mut().zip(rubbing.force).for_each(|(sum, f)| *sum += sign * f);
-            sum[3] += rubbing.dissipation();
-            sum[4] += f64::from(acts && !slips);
-            sum[5] += f64::from(slips);
-        }
-        partial.extend_from_slice(sums.as_flattened());
-    }
-    let sums = problem.space.sum(&partial, 6 * names.len());
+    let of_state = |state: &ContactState| {
+        let rubbing = state.friction?;
+        let acts = rubbing.limit > 0.0 && (rubbing.is_given || state.status.is_closed());
+        let slips = acts && rubbing.status(size) == Status::Slip;
+        let [x, y, z] = rubbing.force.map(|f| signs[pairs[state.pair].contact] * f);
+        Some([x, y, z, rubbing.dissipation(), f64::from(acts && !slips), f64::from(slips)])
+    };
+    let sums = by_contact(problem, discrete, contact, of_state);
     let of_contact = |&[x, y, z, dissipation, sticking, slipping]: &[f64; 6]| Rubbed {
         force: [x, y, z],
         dissipation,
         sticking: sticking as u64,
         slipping: slipping as u64,
     };
-    let rubbed = sums.as_chunks::<6>().0.iter().map(of_contact);
+    let rubbed = sums.iter().map(of_contact);
     let all = scene.contact.iter().zip(rubbed);
     all.filter(|((_, contact), _)| contact.friction.is_some())
         .map(|((name, _), rubbed)| (name.clone(), rubbed))
@@ -251,7 +238,7 @@ fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[Contact
         external_work: Some(state.external_work),
         internal_energy: Some(state.internal_energy),
         energy: Some(if given == 0.0 { state.energy } else { state.energy + given }),
-        energies: energies.as_ref().map(balanced),
+        energies: energies.as_ref().map(|energies| energies.parts),
         max_displacement: Some(largest),
         max_von_mises: Some(maximum(von_mises)),
         residuals: Residuals {
@@ -273,12 +260,6 @@ fn state(scene: &Scene, discrete: &Discrete, newton: &Newton, contact: &[Contact
         },
         measures: Measures::default(),
     }
-}
-
-/// Energies as records have them.
-fn balanced(energies: &newton::Energies) -> Energies {
-    let &newton::Energies { external, stored, plastic, friction, closing, .. } = energies;
-    Energies { external, stored, plastic, friction, closing }
 }
 
 /// What acts on a body.
@@ -327,30 +308,36 @@ fn contact_forces(
     discrete: &Discrete,
     contact: &[ContactState],
 ) -> Vec<[f64; 3]> {
+    let (pairs, signs) = (&discrete.contacts.pairs, signs(scene, discrete));
+    by_contact(problem, discrete, contact, |state| {
+        let mut force = pairs[state.pair].force(state.force);
+        if let Some(rubbing) = &state.friction {
+            force.iter_mut().zip(rubbing.force).for_each(|(sum, f)| *sum += f);
+        }
+        Some(force.map(|f| signs[pairs[state.pair].contact] * f))
+    })
+}
+
+/// Sums of some numbers of each pair, by contact. Collective.
+fn by_contact<const N: usize>(
+    problem: &TornProblem,
+    discrete: &Discrete,
+    contact: &[ContactState],
+    of: impl Fn(&ContactState) -> Option<[f64; N]>,
+) -> Vec<[f64; N]> {
     let Contacts { names, pairs, .. } = &discrete.contacts;
-    let signs = signs(scene, discrete);
-    let of_pair: HashMap<usize, [f64; 3]> = contact
-        .iter()
-        .map(|state| {
-            let mut force = pairs[state.pair].force(state.force);
-            if let Some(rubbing) = &state.friction {
-                force.iter_mut().zip(rubbing.force).for_each(|(sum, f)| *sum += f);
-            }
-            (state.pair, force)
-        })
-        .collect();
+    let of_pair: HashMap<usize, [f64; N]> = contact.iter().filter_map(|state| Some((state.pair, of(state)?))).collect();
     let mut partial = Vec::new();
     for rows in problem.space.owned() {
-        let mut sums = vec![[0.0; 3]; names.len()];
+        let mut sums = vec![[0.0; N]; names.len()];
         for row in rows.clone() {
-            if let Kind::Contact { pair } = problem.constraints.rows[row].kind {
-                let contact = pairs[pair].contact;
-                let force = of_pair.get(&pair).copied().unwrap_or_default();
-                sums[contact].iter_mut().zip(force).for_each(|(sum, f)| *sum += signs[contact] * f);
+            if let Kind::Contact { pair } = problem.constraints.rows[row].kind
+                && let Some(numbers) = of_pair.get(&pair)
+            {
+                sums[pairs[pair].contact].iter_mut().zip(numbers).for_each(|(sum, x)| *sum += x);
             }
         }
         partial.extend_from_slice(sums.as_flattened());
     }
-    let sum = problem.space.sum(&partial, 3 * names.len());
-    sum.as_chunks::<3>().0.to_vec()
+    problem.space.sum(&partial, N * names.len()).as_chunks::<N>().0.to_vec()
 }
