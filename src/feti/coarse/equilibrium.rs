@@ -6,18 +6,14 @@
 //! is such a motion otherwise. Nothing can be moved for free in addition if `-w` and the pushes can make up any force.
 //! Loads change in straight lines and what can be held is convex, so the ends of the steps stand for all between them.
 //!
-//! With Coulomb's friction a contact can exert all forces of a cone. As many of its generators are taken as it takes: a motion
-//! that is left over adds to each cone the force that resists it most, until there is none that does. So what is refused cannot be
-//! held. Tresca's friction counts with any size here: whether its limit is enough is found out by solving.
+//! Contacts with friction can exert more: [`super::cones`].
 //!
 //! Gaps play no part: a body may first have to move to where a contact holds it.
 
-use std::collections::HashMap;
-
 use super::Coarse;
-use super::bodies::Motion;
+use super::bodies::{BodyMotions, Motion};
+use super::cones::{Cones, unit};
 use crate::constraint::Constraints;
-use crate::constraint::friction::Slider;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
 use crate::qp::nnls;
@@ -42,6 +38,9 @@ pub struct Unheld {
 
 /// Forces smaller than this share of all are nothing.
 const NOTHING: f64 = 1e-9;
+
+/// Generators are added to cones so many times at most.
+const CUTS: usize = 60;
 
 /// Whether all bodies are held at the end of each stage, where loads have the resultants `R'f` (six numbers a cluster,
 /// collective), which are asked for only if supports leave some body free. Collective.
@@ -73,13 +72,7 @@ pub fn check(
         Err(Box::new(Unheld { body, piece, motion, stage, driven }))
     };
     for (stage, resultants) in (0..stages).map(|stage| (stage, resultants(stage))) {
-        let (mut force, mut all) = (vec![0.0; MODES * motions.bodies()], 0.0);
-        for (cluster, modes) in resultants.chunks_exact(MODES).enumerate() {
-            let mut of_cluster = vec![0.0; force.len()];
-            motions.add_force(cluster, modes, &mut of_cluster);
-            all += length(&of_cluster);
-            force.iter_mut().zip(of_cluster).for_each(|(f, s)| *f += s);
-        }
+        let (force, all) = on_bodies(motions, &resultants);
         let load = along(&force);
         let cones = Cones::new(coarse, space, constraints, (&friction(stage), free.len()), along);
         let mut pushes = [&normals[..], &cones.sides].concat();
@@ -117,99 +110,14 @@ pub fn check(
     Ok(())
 }
 
-/// Generators are added to cones so many times at most.
-const CUTS: usize = 60;
-
-/// What contacts with friction can exert on free motions.
-struct Cones {
-    /// Of each: along the normal, and along the surface as far as friction goes, for a unit force.
-    axes: Vec<[Vec<f64>; 3]>,
-    /// Forces that are there in any case: both ways along the surface under Tresca's law, and where cones have sides.
-    sides: Vec<Vec<f64>>,
-}
-
-impl Cones {
-    /// With these laws of friction and so many free motions, `along` which forces are told. Collective.
-    fn new(
-        coarse: &Coarse,
-        space: &RowSpace,
-        constraints: &Constraints,
-        (friction, motions): (&[Option<Friction>], usize),
-        along: impl Fn(&[f64]) -> Vec<f64>,
-    ) -> Self {
-        if !constraints.has_friction {
-            return Self { axes: Vec::new(), sides: Vec::new() };
-        }
-        let of_row: HashMap<usize, &Slider> =
-            constraints.sliders.iter().map(|slider| (slider.normal, slider)).collect();
-        let unit_force = |row: usize, factor: f64| {
-            let mut force = along(&coarse.force_on_bodies(row));
-            force.iter_mut().for_each(|f| *f *= factor / constraints.rows[row].scale);
-            force
-        };
-        let mut width = 3 * motions + 1;
-        let cone = |row: usize| {
-            let slider = of_row.get(&row)?;
-            let (factor, is_given) = match friction[slider.contact]? {
-                Friction::Coulomb(coefficient) => (coefficient, 0.0),
-                Friction::Tresca(_) => (1.0, 1.0),
-            };
-            let mut numbers = unit_force(row, 1.0);
-            for k in 0..2 {
-                let tangent = slider.tangents.get(k);
-                numbers.extend(tangent.map_or(vec![0.0; motions], |tangent| unit_force(tangent.row, factor)));
-            }
-            numbers.push(is_given);
-            Some(numbers)
-        };
-        let all = space.gather(width, cone);
-        width -= 1;
-        let (mut axes, mut sides) = (Vec::new(), Vec::new());
-        for numbers in all {
-            let [normal, first, second] = [0, 1, 2].map(|k| numbers[k * motions..][..motions].to_vec());
-            if numbers[width] == 1.0 {
-                let opposite = |x: &Vec<f64>| x.iter().map(|x| -x).collect::<Vec<f64>>();
-                sides.extend([opposite(&first), opposite(&second), first, second]);
-            } else {
-                axes.push([normal, first, second]);
-            }
-        }
-        // Four sides of each cone, so that it has all its dimensions.
-        let cones = Self { axes, sides: Vec::new() };
-        for [normal, first, second] in &cones.axes {
-            for (a, b) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-                sides.push(combined(normal, (a, first), (b, second)));
-            }
-        }
-        let sides = sides.into_iter().filter(|side| length(side) > 0.0).map(unit).collect();
-        Self { sides, ..cones }
+/// Forces and moments on all bodies from those on clusters, and the sum of their sizes.
+fn on_bodies(motions: &BodyMotions, resultants: &[f64]) -> (Vec<f64>, f64) {
+    let (mut force, mut all) = (vec![0.0; MODES * motions.bodies()], 0.0);
+    for (cluster, modes) in resultants.chunks_exact(MODES).enumerate() {
+        let mut of_cluster = vec![0.0; force.len()];
+        motions.add_force(cluster, modes, &mut of_cluster);
+        all += length(&of_cluster);
+        force.iter_mut().zip(of_cluster).for_each(|(f, s)| *f += s);
     }
-
-    /// The force of each cone that resists a motion most, of those that resist it.
-    fn against(&self, motion: &[f64]) -> Vec<Vec<f64>> {
-        let most = |[normal, first, second]: &[Vec<f64>; 3]| {
-            let (a, b) = (dot(first, motion), dot(second, motion));
-            let size = a.hypot(b);
-            if size == 0.0 {
-                return None;
-            }
-            let force = unit(combined(normal, (a / size, first), (b / size, second)));
-            (dot(&force, motion) > RESISTS * length(motion)).then_some(force)
-        };
-        self.axes.iter().filter_map(most).collect()
-    }
-}
-
-/// A force resists a motion if it is along it by more than this share.
-const RESISTS: f64 = 1e-8;
-
-/// `x + a y + b z`.
-fn combined(x: &[f64], (a, y): (f64, &[f64]), (b, z): (f64, &[f64])) -> Vec<f64> {
-    x.iter().zip(y).zip(z).map(|((x, y), z)| x + a * y + b * z).collect()
-}
-
-fn unit(mut x: Vec<f64>) -> Vec<f64> {
-    let size = length(&x);
-    x.iter_mut().for_each(|x| *x /= if size > 0.0 { size } else { 1.0 });
-    x
+    (force, all)
 }

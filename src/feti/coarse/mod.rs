@@ -1,11 +1,13 @@
 //! The coarse problem `G G' a = r` with `G = R'B'`, and what follows from it.
 //!
 //! [`matrix`] is `G`, [`problem`] what ranks make of it together. [`base`] has the [`factor`] of the equalities, on which [`face`], the
-//! coarse problem of the rows that hold, is built; [`projector`] is `P = I - G'(G G')^-1 G` of all rows. [`recover`] has `e = R'f` and `R alpha`, [`motion`] the `alpha` of a solution. Of rows along which surfaces slide [`sliding`] has what is kept. [`bodies`] are
-//! motions of whole bodies, and [`equilibrium`] tells whether anything holds these.
+//! coarse problem of the rows that hold, is built; [`projector`] is `P = I - G'(G G')^-1 G` of all rows. [`recover`] has `e = R'f` and `R alpha`, [`motion`] the
+//! `alpha` of a solution. Of rows along which surfaces slide [`sliding`] has what is kept. [`bodies`] are motions of whole bodies,
+//! [`cones`] what friction can exert on them, and [`equilibrium`] tells whether anything holds these.
 
 mod base;
 pub mod bodies;
+mod cones;
 pub mod equilibrium;
 pub mod face;
 pub mod factor;
