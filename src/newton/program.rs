@@ -143,11 +143,6 @@ impl Programs {
         lambda
     }
 
-    /// Multipliers `start` with `G l = e`, where the residual of the program is `residual`.
-    pub fn from(start: Vec<f64>, residual: Vec<f64>) -> Rest {
-        Rest { start, residual, directions: Directions::default(), spent: 0 }
-    }
-
     /// Solves the program with these `resultants` `e` from such multipliers, or solves on. [`Programs::face`] has the kept rows
     /// afterwards. Collective.
     ///
@@ -310,15 +305,7 @@ impl Programs {
                 statistics.hessian += estimate.as_ref().map_or(0, |e| e.products);
                 self.norm = estimate.map(|e| e.norm);
             }
-            // The multiplier of G x = 0 follows from b on the rows that the last program kept. The slack of open contacts
-            // is part of b too, but is no rigid motion.
-            let mut multiplier = self.face.as_ref().map(|face| {
-                let mut a = face.amplitudes(coarse, &b);
-                a.iter_mut().zip(&mean).for_each(|(a, m)| *a -= m);
-                let mut multiplier = vec![0.0; b.len()];
-                coarse.add_transpose(1.0, &a, &mut multiplier);
-                multiplier
-            });
+            let mut multiplier = self.face.as_ref().map(|face| first_multiplier(face, coarse, &b, &mean));
             let lower = problem.laws().lower_bounds(&start);
             // With a norm that is not a number SMALSE-M ends as `Outcome::NotFinite`.
             let norm = self.norm.unwrap_or(f64::NAN);
@@ -370,4 +357,14 @@ impl Programs {
         (self.reference, self.first) = (Some(reference), false);
         limits.relative * reference >= limits.drop * first
     }
+}
+
+/// The multiplier of `G x = 0` that SMALSE-M begins with. It follows from `b`, less its `mean` motion, on the rows that the last program
+/// kept. The slack of open contacts is part of `b` too, but is no rigid motion. Collective.
+fn first_multiplier(face: &CoarseFace, coarse: &Coarse, b: &[f64], mean: &[f64]) -> Vec<f64> {
+    let mut a = face.amplitudes(coarse, b);
+    a.iter_mut().zip(mean).for_each(|(a, m)| *a -= m);
+    let mut multiplier = vec![0.0; b.len()];
+    coarse.add_transpose(1.0, &a, &mut multiplier);
+    multiplier
 }

@@ -11,7 +11,7 @@ use super::dual::Dual;
 use super::forcing::TIGHTEST;
 use super::iteration::Newton;
 use super::problem::TornProblem;
-use super::program::Programs;
+use super::solution::Rest;
 use super::step::{Recovered, StepSolver};
 use crate::feti::Torn;
 use crate::feti::coarse::recover;
@@ -70,7 +70,7 @@ impl StepSolver<'_> {
             alive: &|_| {},
         };
         let (mut found, _) =
-            self.programs.on_face((problem, dual, &e), Programs::from(lambda, residual), Some(known), limits);
+            self.programs.on_face((problem, dual, &e), Rest::new(lambda, residual), Some(known), limits);
         let Recovered { mut du, refined, .. } =
             self.recover(problem, (&forces, &open), &mut found, drop.max(TIGHTEST), timer);
         for (du, lifted) in du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {

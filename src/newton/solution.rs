@@ -31,6 +31,11 @@ pub struct Rest {
 }
 
 impl Rest {
+    /// Of multipliers `start` with `G l = e`, where the residual of the program is `residual`.
+    pub fn new(start: Vec<f64>, residual: Vec<f64>) -> Self {
+        Self { start, residual, directions: Directions::default(), spent: 0 }
+    }
+
     /// The directions that it knows.
     pub fn into_directions(self) -> Directions {
         self.directions

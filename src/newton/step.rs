@@ -210,7 +210,7 @@ impl<'a> StepSolver<'a> {
         let mut residual = vec![0.0; slack.len()];
         self.respond(&lambda, &mut forces.clone(), &mut residual, timer);
         residual.iter_mut().zip(&open).for_each(|(r, c)| *r -= c);
-        let (mut from, mut forcing) = (Programs::from(lambda, residual), forcing);
+        let (mut from, mut forcing) = (Rest::new(lambda, residual), forcing);
         let (mut statistics, mut is_exact) = (Statistics::default(), false);
         let (found, recovered, rest) = loop {
             let dual = Dual {
@@ -342,7 +342,7 @@ impl<'a> StepSolver<'a> {
             let sum: f64 = rows.iter().map(|&row| flexibility.of_row(constraints, row)).sum();
             Disc {
                 normal: slider.normal,
-                entries: (rows[0], rows.get(1).copied()),
+                entries: [rows[0], rows[rows.len() - 1]],
                 radius,
                 flexibility: sum / rows.len() as f64 * NEIGHBOURS,
             }

@@ -30,6 +30,16 @@ pub struct Disc {
     pub radius: f64,
 }
 
+/// A pair of entries of a vector; the same index twice is an interval, whose second number is none.
+pub(super) fn pair_of([i, j]: [usize; 2], x: &[f64]) -> [f64; 2] {
+    [x[i], if i == j { 0.0 } else { x[j] }]
+}
+
+/// Sets a pair of entries of a vector; of an interval the first.
+pub(super) fn put_pair(entries: [usize; 2], x: &mut [f64], pair: [f64; 2]) {
+    entries.into_iter().zip(pair).rev().for_each(|(i, value)| x[i] = value);
+}
+
 /// Where a pair is in its disc, and where the gradient presses it to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Place {
@@ -54,14 +64,12 @@ pub enum Place {
 impl Disc {
     /// The pair's entries of a vector.
     fn of(&self, x: &[f64]) -> [f64; 2] {
-        let [i, j] = self.entries;
-        [x[i], if i == j { 0.0 } else { x[j] }]
+        pair_of(self.entries, x)
     }
 
     /// Sets the pair's entries of a vector.
     fn put(&self, x: &mut [f64], pair: [f64; 2]) {
-        // An interval's second number is none.
-        self.entries.into_iter().zip(pair).rev().for_each(|(i, value)| x[i] = value);
+        put_pair(self.entries, x, pair);
     }
 
     /// x - c.

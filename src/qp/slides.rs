@@ -32,8 +32,8 @@ const SOFT: f64 = 30.0;
 pub struct Disc {
     /// The unknown that its radius grows with.
     pub normal: usize,
-    /// Its unknowns; a second one if it has two.
-    pub entries: (usize, Option<usize>),
+    /// Its unknowns; twice the same if it has one.
+    pub entries: [usize; 2],
     /// Its radius: a constant, and a factor of the unknown that it grows with.
     pub radius: [f64; 2],
     /// How far its unknowns move the gradient: about the diagonal of the matrix.
@@ -81,15 +81,17 @@ pub struct Slides {
 impl Disc {
     /// Its numbers in a vector.
     fn of(&self, x: &[f64]) -> [f64; 2] {
-        [x[self.entries.0], self.entries.1.map_or(0.0, |second| x[second])]
+        discs::pair_of(self.entries, x)
     }
 
     /// Writes its numbers into a vector.
-    fn put(&self, [a, b]: [f64; 2], x: &mut [f64]) {
-        x[self.entries.0] = a;
-        if let Some(second) = self.entries.1 {
-            x[second] = b;
-        }
+    fn put(&self, pair: [f64; 2], x: &mut [f64]) {
+        discs::put_pair(self.entries, x, pair);
+    }
+
+    /// Whether it has two unknowns.
+    fn is_plane(&self) -> bool {
+        self.entries[0] != self.entries[1]
     }
 
     /// The unknown across a slip.
@@ -150,9 +152,8 @@ impl Slides {
     /// The discs of these radii, for the difference of unknowns to some `start`.
     pub fn around(&self, start: &[f64], radii: &[f64]) -> Vec<discs::Disc> {
         let of = |(disc, &radius): (&Disc, &f64)| {
-            let (first, second) = disc.entries;
             let centre = disc.of(start).map(|x| -x);
-            discs::Disc { entries: [first, second.unwrap_or(first)], centre, radius }
+            discs::Disc { entries: disc.entries, centre, radius }
         };
         self.discs.iter().zip(radii).map(of).collect()
     }
@@ -161,7 +162,7 @@ impl Slides {
     pub fn change(&self, radii: &[f64], next: &[f64], n: usize) -> Vec<f64> {
         let mut change = vec![0.0; n];
         for ((disc, radius), next) in self.discs.iter().zip(radii).zip(next) {
-            change[disc.entries.0] = disc.flexibility * (next - radius);
+            change[disc.entries[0]] = disc.flexibility * (next - radius);
         }
         change
     }
@@ -191,13 +192,12 @@ impl Slides {
     /// Marks the unknowns that need not be what [`Slides::fix`] makes them.
     pub fn mark(&self, kept: &mut [bool]) {
         for (disc, state) in self.iter() {
-            let (first, second) = disc.entries;
             let free = match state {
                 Slide::Open => false,
                 Slide::Stick => true,
-                Slide::Slip { .. } => second.is_some(),
+                Slide::Slip { .. } => disc.is_plane(),
             };
-            [Some(first), second].into_iter().flatten().for_each(|entry| kept[entry] = free);
+            disc.entries.into_iter().for_each(|entry| kept[entry] = free);
         }
     }
 
@@ -205,8 +205,7 @@ impl Slides {
     pub fn held(&self, kept: &[bool]) -> Vec<bool> {
         let mut held = kept.to_vec();
         for (disc, ..) in self.slipping() {
-            let (first, second) = disc.entries;
-            [Some(first), second].into_iter().flatten().for_each(|entry| held[entry] = false);
+            disc.entries.into_iter().for_each(|entry| held[entry] = false);
         }
         held
     }
@@ -214,7 +213,7 @@ impl Slides {
     /// Open discs whose unknowns are kept stick.
     pub fn adopt(&mut self, kept: &[bool]) {
         for (disc, state) in self.discs.iter().zip(&mut self.states) {
-            if *state == Slide::Open && kept[disc.entries.0] {
+            if *state == Slide::Open && kept[disc.entries[0]] {
                 *state = Slide::Stick;
             }
         }
@@ -222,18 +221,15 @@ impl Slides {
 
     /// Unknowns of discs of two that slip, with the unit vector across, and whether the spring there is soft.
     pub fn across(&self) -> impl Iterator<Item = ([usize; 2], [f64; 2], bool)> {
-        self.slipping().filter_map(|(disc, direction, compliance)| {
-            let is_soft = compliance > SOFT * disc.flexibility;
-            Some(([disc.entries.0, disc.entries.1?], across(direction), is_soft))
+        self.slipping().map(|(disc, direction, compliance)| {
+            (disc.entries, across(direction), compliance > SOFT * disc.flexibility)
         })
     }
 
     /// Those of two unknowns that slip, with the direction and the compliance of the spring across.
     fn slipping(&self) -> impl Iterator<Item = (&Disc, [f64; 2], f64)> {
         self.iter().filter_map(|(disc, state)| match state {
-            Slide::Slip { direction, compliance, .. } if disc.entries.1.is_some() => {
-                Some((disc, direction, compliance))
-            }
+            Slide::Slip { direction, compliance, .. } if disc.is_plane() => Some((disc, direction, compliance)),
             _ => None,
         })
     }
@@ -299,14 +295,14 @@ impl Slides {
     /// state says besides, as a gradient, into `hung`.
     pub fn compare(&self, next: &[Slide], x: &[f64], [changed, fixed, hung]: [&mut [f64]; 3]) {
         for ((disc, state), next) in self.iter().zip(next) {
-            changed[disc.entries.0] = f64::from(next.name() != state.name());
+            changed[disc.entries[0]] = f64::from(next.name() != state.name());
             let Slide::Slip { direction, radius, compliance } = *next else { continue };
             let (here, beside) = (disc.of(x), disc.across(direction, x));
             let along = here[0] * direction[0] + here[1] * direction[1];
             let Slide::Slip { radius: before, .. } = state else { continue };
-            fixed[disc.entries.0] = disc.flexibility * (radius - before);
+            fixed[disc.entries[0]] = disc.flexibility * (radius - before);
             let across = (disc.flexibility + compliance) * beside;
-            hung[disc.entries.0] = (disc.flexibility * (along - before)).hypot(across);
+            hung[disc.entries[0]] = (disc.flexibility * (along - before)).hypot(across);
         }
     }
 

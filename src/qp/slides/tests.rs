@@ -57,8 +57,8 @@ impl Face for Dense {
 fn discs(a: &Matrix, radius: impl Fn(usize) -> [f64; 2]) -> Vec<Disc> {
     let disc = |k: usize| {
         let flexibility = a.entries[3 * k * a.n + 3 * k];
-        let second = (3 * k + 3 < a.n).then_some(3 * k + 1);
-        Disc { normal: 3 * k + 2, entries: (3 * k, second), radius: radius(k), flexibility }
+        let second = 3 * k + usize::from(3 * k + 3 < a.n);
+        Disc { normal: 3 * k + 2, entries: [3 * k, second], radius: radius(k), flexibility }
     };
     (0..a.n / 3).map(disc).collect()
 }
@@ -130,7 +130,7 @@ fn sets_of_discs_end_where_projected_gradients_do() {
 
 #[test]
 fn a_disc_fixes_along_its_slip_and_springs_act_across() {
-    let disc = Disc { normal: 2, entries: (0, Some(1)), radius: [0.5, 0.0], flexibility: 2.0 };
+    let disc = Disc { normal: 2, entries: [0, 1], radius: [0.5, 0.0], flexibility: 2.0 };
     let mut slides = Slides::open(vec![disc]);
     // z = x + v / f = (0, 2): beyond the radius.
     slides.states = slides.next(&[0.0, 0.5, 0.0], &[0.0, 3.0, 0.0], 0.0);
@@ -186,7 +186,7 @@ fn what_swings_as_a_whole_sticks_on_the_way() {
 
 #[test]
 fn soft_springs_are_told_and_turning_is_no_change_of_radius() {
-    let disc = Disc { normal: 2, entries: (0, Some(1)), radius: [0.5, 0.0], flexibility: 2.0 };
+    let disc = Disc { normal: 2, entries: [0, 1], radius: [0.5, 0.0], flexibility: 2.0 };
     let mut slides = Slides::open(vec![disc]);
     for (slides_by, is_soft) in [(3.0, false), (300.0, true)] {
         slides.states = slides.next(&[0.0, 0.5, 0.0], &[0.0, slides_by, 0.0], 0.0);
