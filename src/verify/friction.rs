@@ -13,6 +13,8 @@ const FRICTION: f64 = 0.3;
 const PRESSURE: f64 = 100.0;
 /// Shear modulus of a material with Young's modulus 210000 and no contraction.
 const SHEAR: f64 = 105_000.0;
+/// A rigid plane under what is drawn above `z = 0`, as a key of a scene.
+pub(super) const FLOOR: &str = "rigid = { plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] } }";
 /// Edge of the block.
 const EDGE: f64 = 1000.0;
 
@@ -67,7 +69,7 @@ impl Case for Block {
             left = {{ surface = "cube.xmin", traction = [0.0, 0.0, {:?}] }}
             [contact.floor]
             slave = "cube.zmin"
-            rigid = {{ plane = {{ point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }} }}
+            {FLOOR}
             friction = {FRICTION:?}"#,
             -PRESSURE, -shear
         )

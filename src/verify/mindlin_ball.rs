@@ -4,17 +4,13 @@
 //! block, by symmetry; its size makes it come 3 % less near along the normal, which is no part of this, and little along the push.
 //! Stresses across the push, which the closed form leaves out, make a percent of the radius.
 
-use super::mindlin::{mirrored, planes};
+use super::mindlin::{BLOCK, FRICTION, RADIUS, mirrored, planes};
 use super::run::Run;
 use super::{Case, Demand, Error, material_line};
 use crate::analytic::hertz::Hertz;
 use crate::analytic::mindlin;
 use crate::element::Kind;
-use crate::material::VonMises;
 
-const BLOCK: VonMises = VonMises::elastic(150_000.0, 0.45);
-const RADIUS: f64 = 50.0;
-const FRICTION: f64 = 0.3;
 /// Makes a circle of contact of radius 0.7, and friction of about half of what would make all of it slip.
 const APPROACH: f64 = 0.0096;
 const PUSHED: f64 = 0.0015;

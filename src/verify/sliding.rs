@@ -3,6 +3,7 @@
 //! Beyond the angle of friction a block on an incline is refused before anything is solved, which no case can express; a test of the
 //! program has that.
 
+use super::friction::FLOOR;
 use super::run::Run;
 use super::{Case, Demand, Error};
 use crate::analytic::rubbing::up_a_slope;
@@ -29,7 +30,7 @@ impl Case for Dragged {
             decomposition.subdomains = 4
             support.top = {{ surface = "plate.zmax", fix = ["x", "y"], displacement = [1.0, 0.0, 0.0] }}
             load.top = {{ surface = "plate.zmax", traction = [0.0, 0.0, -50.0] }}
-            contact.floor = {{ slave = "plate.zmin", friction = {FRICTION:?}, rigid = {{ plane = {{ point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }} }} }}
+            contact.floor = {{ slave = "plate.zmin", friction = {FRICTION:?}, {FLOOR} }}
             [body.plate]
             material = "steel"
             element = "tet4"
@@ -71,7 +72,7 @@ impl Case for Incline {
             material.steel = {{ young = 210000.0, poisson = 0.3 }}
             decomposition.subdomains = 4
             load.weight = {{ body = "block", body_force = [{along:?}, 0.0, {across:?}] }}
-            contact.floor = {{ slave = "block.zmin", friction = {FRICTION:?}, rigid = {{ plane = {{ point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }} }} }}
+            contact.floor = {{ slave = "block.zmin", friction = {FRICTION:?}, {FLOOR} }}
             [body.block]
             material = "steel"
             element = "tet4"
