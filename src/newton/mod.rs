@@ -27,6 +27,7 @@ pub mod outcome;
 pub mod path;
 pub mod problem;
 pub mod program;
+mod radii;
 pub mod residuals;
 pub mod response;
 pub mod snapshot;

@@ -9,18 +9,15 @@
 use super::dual::{Dual, DualFace, Multipliers, WholeDual, sliding};
 use super::forcing::Forcing;
 use super::problem::TornProblem;
+use super::radii;
 use super::solution::{DualSolution, Rest};
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::{Coarse, Floating};
-use crate::qp::feasible::FeasibleSet;
 use crate::qp::pcpg::{Directions, Pcpg};
 use crate::qp::quadratic::{Quadratic, Space};
 use crate::qp::slides::{Disc, Slides};
-use crate::qp::{Limits, Outcome, Statistics, active_set, power, smalse};
+use crate::qp::{Limits, Outcome, Statistics, active_set, power};
 use crate::scene::Qp;
-
-/// Programs with given radii of friction that SMALSE-M solves at most, one after the other.
-const ROUNDS: usize = 60;
 
 /// Of a residual its projection cannot tell more than this share.
 const ROUNDING: f64 = 1e-14;
@@ -179,6 +176,7 @@ impl Programs {
             wasted = found.statistics;
             dual.restrict_scaling(problem.constraints, &vec![true; b.len()]);
         }
+        let limits = Limits { drop: forcing.of_smalse(), ..limits };
         let mut found = self.smalse(problem, dual, lambda, b, limits)?;
         found.statistics += wasted;
         Ok(found)
@@ -288,7 +286,7 @@ impl Programs {
         dual: Dual,
         start: Vec<f64>,
         b: Vec<f64>,
-        limits: Limits,
+        mut limits: Limits,
     ) -> Result<DualSolution, Floating> {
         let (timer, coarse) = (dual.timer, dual.coarse);
         let space = Multipliers(problem.space, timer);
@@ -297,44 +295,34 @@ impl Programs {
         let mut projected = b.clone();
         let mean = timer.time("coarse problem", || projector.project(&mut projected));
         let mut statistics = Statistics::default();
-        let (mut x, mut outcome, mut at_floor) = (vec![0.0; b.len()], Outcome::Converged, true);
-        let mut radii = self.slides.radii(&start);
-        if space.norm(&projected) != 0.0 {
+        let (mut x, mut radii) = (vec![0.0; b.len()], self.slides.radii(&start));
+        let (mut outcome, mut at_floor) = (Outcome::Converged, true);
+        let size = space.norm(&projected);
+        if size != 0.0 {
             if self.norm.is_none() {
                 let estimate = power::norm(&space, &mut dual, &projected);
                 statistics.hessian += estimate.as_ref().map_or(0, |e| e.products);
                 self.norm = estimate.map(|e| e.norm);
             }
-            let mut multiplier = self.face.as_ref().map(|face| first_multiplier(face, coarse, &b, &mean));
-            let lower = problem.laws().lower_bounds(&start);
-            // With a norm that is not a number SMALSE-M ends as `Outcome::NotFinite`.
-            let norm = self.norm.unwrap_or(f64::NAN);
-            for round in 0..ROUNDS {
-                let set = match problem.constraints.has_friction {
-                    false => FeasibleSet::above(lower.clone()),
-                    true => FeasibleSet::with_discs(lower.clone(), self.slides.around(&start, &radii)),
-                };
-                let solution = smalse::solve(
-                    smalse::Problem { space: &space, function: &mut dual, b: &projected, set: &set },
-                    &smalse::Settings { limits, norm },
-                    smalse::Start { x, multiplier: multiplier.take() },
-                );
-                at_floor = if round == 0 { self.note(&limits, solution.first_norm) } else { at_floor };
-                statistics += solution.statistics;
-                (x, outcome) = (solution.x, solution.outcome);
-                if !problem.constraints.has_friction || outcome != Outcome::Converged {
-                    break;
-                }
-                // Under Coulomb's law the radii follow.
-                let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
-                let next = self.slides.radii(&lambda);
-                let change = self.slides.change(&radii, &next, lambda.len());
-                if space.norm(&change) <= limits.target(solution.first_norm) {
-                    break;
-                }
-                (radii, multiplier) = (next, Some(solution.multiplier));
-                outcome = Outcome::LimitReached;
-            }
+            // The first program of all refers to the residual on all rows, as the active set's does.
+            limits.reference.get_or_insert(size);
+            self.reference.get_or_insert(size);
+            limits.products = limits.products.saturating_sub(statistics.hessian);
+            let program = radii::Program {
+                space: &space,
+                function: &mut dual,
+                b: &projected,
+                start: &start,
+                lower: problem.laws().lower_bounds(&start),
+                has_friction: problem.constraints.has_friction,
+                // With a norm that is not a number SMALSE-M ends as `Outcome::NotFinite`.
+                norm: self.norm.unwrap_or(f64::NAN),
+                multiplier: self.face.as_ref().map(|face| first_multiplier(face, coarse, &b, &mean)),
+            };
+            let found = radii::solve(program, &mut self.slides, limits);
+            at_floor = self.note(&limits, found.first_norm);
+            statistics += found.statistics;
+            (x, radii, outcome) = (found.x, found.radii, found.outcome);
         }
         let mut lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         dual.project(&mut x);

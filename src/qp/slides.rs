@@ -149,6 +149,18 @@ impl Slides {
         self.discs.iter().map(|disc| disc.radius(x)).collect()
     }
 
+    /// Moves what slips along the rays of its discs to these radii: in the difference `x` of unknowns to some `start`.
+    pub fn carry(&self, start: &[f64], x: &mut [f64], radii: &[f64]) {
+        for ((disc, state), radius) in self.iter().zip(radii) {
+            let ([a, b], [s, t]) = (disc.of(start), disc.of(x));
+            let size = (a + s).hypot(b + t);
+            if matches!(state, Slide::Slip { .. }) && size > 0.0 {
+                let stretch = radius / size - 1.0;
+                disc.put([s + stretch * (a + s), t + stretch * (b + t)], x);
+            }
+        }
+    }
+
     /// The discs of these radii, for the difference of unknowns to some `start`.
     pub fn around(&self, start: &[f64], radii: &[f64]) -> Vec<discs::Disc> {
         let of = |(disc, &radius): (&Disc, &f64)| {

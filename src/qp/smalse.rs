@@ -14,7 +14,7 @@
 //! L follows from the gradient, the Q-part of a direction is a by-product of its product: a step costs one product with
 //! A and two projections. Convergence does not depend on the quality of the norm, a few per cent are plenty.
 
-use super::feasible::FeasibleSet;
+use super::feasible::{FeasibleSet, Parts};
 use super::mprgp::{Mprgp, Norms, Point};
 use super::penalty::Penalised;
 use super::quadratic::{Quadratic, Space};
@@ -93,9 +93,9 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let mut inner = Mprgp::new(space, set, penalty, settings.limits.products).with_size(norm);
     let mut statistics = Statistics::default();
     let mut point = first_point(space, &mut hessian, &right, x, &mut statistics);
+    let first = norm_without_penalty(space, set, &point, penalty);
 
-    let mut tests =
-        Tests { limits: settings.limits, norm, ratio: RATIO * norm, first: None, now: UNKNOWN, done: false };
+    let mut tests = Tests { limits: settings.limits, norm, ratio: RATIO * norm, first, now: UNKNOWN, done: false };
     let mut cost_before = f64::NEG_INFINITY;
     let outcome = loop {
         // x: minimise L(x, m, rho) until |g^P| <= min(M |Q x|, eta).
@@ -130,7 +130,7 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
         multiplier,
         outcome,
         statistics,
-        first_norm: tests.first.unwrap_or(f64::NAN),
+        first_norm: tests.first,
         gradient_norm: tests.now.gradient,
         defect_norm: tests.now.defect,
     }
@@ -181,6 +181,16 @@ fn first_point(
     point
 }
 
+/// Norm of the projected gradient at the start without what the penalty adds. What a start violates is repaired at once, and says
+/// nothing of how far the solution is.
+fn norm_without_penalty(space: &dyn Space, set: &FeasibleSet, point: &Point, penalty: f64) -> f64 {
+    let gradient: Vec<f64> = point.gradient.iter().zip(&point.defect).map(|(g, q)| g - penalty * q).collect();
+    let mut parts = Parts::new(gradient.len());
+    set.split(&point.x, &gradient, 1.0 / penalty, &mut parts);
+    let d = space.dots(&[(&parts.free, &parts.free), (&parts.chopped, &parts.chopped)]);
+    (d[0] + d[1]).sqrt()
+}
+
 const UNKNOWN: Norms = Norms { gradient: f64::NAN, defect: f64::NAN };
 
 /// When the inner loop stops.
@@ -190,8 +200,8 @@ struct Tests {
     norm: f64,
     /// M.
     ratio: f64,
-    /// |g^P| at the start.
-    first: Option<f64>,
+    /// |g^P| at the start, without the penalty.
+    first: f64,
     /// The norms that were tested last.
     now: Norms,
     /// Whether the whole problem is solved to the tolerance.
@@ -202,9 +212,8 @@ impl Tests {
     /// Whether |g^P| and norm |Q x| are within the tolerance, or |g^P| <= min(M |Q x|, eta).
     fn stop(&mut self, now: Norms) -> bool {
         self.now = now;
-        let first = *self.first.get_or_insert(now.gradient);
-        let target = self.limits.target(first);
-        let loose = (LOOSE * first).max(target);
+        let target = self.limits.target(self.first);
+        let loose = (LOOSE * self.first).max(target);
         self.done = now.gradient <= target && self.norm * now.defect <= target;
         self.done || now.gradient <= loose.min(self.ratio * now.defect)
     }

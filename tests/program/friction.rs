@@ -299,6 +299,20 @@ fn friction_costs_few_more_applications_of_the_dual_operator() {
     }
 }
 
+/// So does the safeguard, beside the active set.
+#[test]
+fn the_safeguard_takes_four_times_the_applications_at_most() {
+    for law in ["friction=0.0", "friction=0.3", "shear_limit=10.0"] {
+        let law = format!("contact.joint.{law}");
+        let [fast, safe] = ["active-set", "smalse-m"].map(|qp| {
+            let summary = solve(2, "two-blocks", &[&law, &format!("solver.qp={qp}")]).converged().summary();
+            (number(&summary, "hessian_multiplications"), number(&summary, "energy"))
+        });
+        assert!(safe.0 <= 4.0 * fast.0, "{law}: {} beside {}", safe.0, fast.0);
+        assert_close(&law, safe.1, fast.1, 1e-6);
+    }
+}
+
 /// Energy of a summary.
 fn energy(summary: &Value, name: &str) -> f64 {
     summary["energies"][name].as_f64().unwrap_or_else(|| panic!("no {name} in {}", summary["energies"]))

@@ -198,3 +198,15 @@ fn soft_springs_are_told_and_turning_is_no_change_of_radius() {
     assert_eq!((changed[0], fixed[0]), (0.0, 0.0));
     assert!(hung[0] > 1.0, "{hung:?}");
 }
+
+#[test]
+fn what_slips_follows_its_circle() {
+    let disc = Disc { normal: 0, entries: [1, 2], radius: [0.0, 0.5], flexibility: 1.0 };
+    let mut slides = Slides::open(vec![disc]);
+    let (start, mut x) = ([9.0, 1.0, 1.0], [1.0, 2.0, 3.0]);
+    slides.carry(&start, &mut x, &[10.0]);
+    assert_eq!(x, [1.0, 2.0, 3.0]);
+    slides.settle(&[10.0, 3.0, 4.0], &[5.0]);
+    slides.carry(&start, &mut x, &[10.0]);
+    assert_eq!(x, [1.0, 5.0, 7.0]);
+}
