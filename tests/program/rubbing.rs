@@ -142,6 +142,35 @@ fn strong_friction_sticks_everywhere_and_weak_friction_nowhere() {
 }
 
 /// Where nothing presses, surfaces do not rub: bodies move as they are told, free of stress, and soon.
+/// Masing's rule: where pressures stay, forces of friction turn by twice what half of the way made of a body that had none.
+#[test]
+fn friction_that_turns_back_follows_masing() {
+    let text = r#"
+        step = [{ support.base = 0.0, friction.roll = 0.0 }, { increments = 2 }, { support.base = -1.0, increments = 4 }, { increments = 4 }]
+        material.steel = { young = 150000.0, poisson = 0.45 }
+        contact.roll = { slave = "block.zmax", friction = 0.3, rigid = { cylinder = { point = [0.0, 0.0, 49.95], axis = [0.0, 1.0, 0.0], radius = 50.0 } } }
+        [support]
+        base = { surface = "block.zmin", fix = ["x", "z"], displacement = [0.015, 0.0, 0.0] }
+        front = { surface = "block.ymin", fix = ["y"] }
+        back = { surface = "block.ymax", fix = ["y"] }
+        [body.block]
+        material = "steel"
+        element = "hex8"
+        grid = { x = [-9.0, -5.0, -3.0, -2.0, -1.6, -1.2, -0.8, -0.4, 0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 3.0, 5.0, 9.0], y = [0.0, 0.4], z = [-8.0, -4.0, -2.0, -1.0, -0.5, 0.0] }"#;
+    let directory = tempfile::tempdir().unwrap();
+    let summary = solve(2, &scene_file(directory.path(), text), &[]).converged().summary();
+    let steps = summary["steps"].as_array().unwrap();
+    let force: Vec<f64> = steps.iter().map(|step| vector(&step["contact_force"])[0]).collect();
+    let pressed = vector(&steps[2]["contact_force"])[2].abs();
+    // Part of what touches slips.
+    assert!(force[2] < -0.4 * 0.3 * pressed && force[2] > -0.9 * 0.3 * pressed, "{force:?}");
+    for k in 1..=2 {
+        let way = [0.0, force[1], force[2]][k];
+        assert!((force[2 + 2 * k] - (force[2] - 2.0 * way)).abs() < 1e-4 * force[2].abs(), "{force:?}");
+        assert!((force[6 + 2 * k] - (force[6] + 2.0 * way)).abs() < 1e-4 * force[2].abs(), "{force:?}");
+    }
+}
+
 #[test]
 fn without_pressure_there_is_no_friction() {
     let directory = tempfile::tempdir().unwrap();
