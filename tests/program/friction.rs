@@ -299,7 +299,7 @@ fn friction_costs_few_more_applications_of_the_dual_operator() {
     }
 }
 
-/// So does the safeguard, beside the active set.
+/// SMALSE-M alone finds the same, and takes few times the applications of F of the active set.
 #[test]
 fn the_safeguard_takes_four_times_the_applications_at_most() {
     for law in ["friction=0.0", "friction=0.3", "shear_limit=10.0"] {

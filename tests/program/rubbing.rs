@@ -141,7 +141,6 @@ fn strong_friction_sticks_everywhere_and_weak_friction_nowhere() {
     assert_eq!(counts("contact.joint.friction=0.05"), [0, 25]);
 }
 
-/// Where nothing presses, surfaces do not rub: bodies move as they are told, free of stress, and soon.
 /// Masing's rule: where pressures stay, forces of friction turn by twice what half of the way made of a body that had none.
 #[test]
 fn friction_that_turns_back_follows_masing() {
@@ -171,6 +170,7 @@ fn friction_that_turns_back_follows_masing() {
     }
 }
 
+/// Where nothing presses, surfaces do not rub: bodies move as they are told, free of stress, and soon.
 #[test]
 fn without_pressure_there_is_no_friction() {
     let directory = tempfile::tempdir().unwrap();
