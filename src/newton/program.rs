@@ -295,7 +295,7 @@ impl Programs {
         let mut projected = b.clone();
         let mean = timer.time("coarse problem", || projector.project(&mut projected));
         let mut statistics = Statistics::default();
-        let (mut x, mut radii) = (vec![0.0; b.len()], self.slides.radii(&start));
+        let mut x = vec![0.0; b.len()];
         let (mut outcome, mut at_floor) = (Outcome::Converged, true);
         let size = space.norm(&projected);
         if size != 0.0 {
@@ -322,12 +322,14 @@ impl Programs {
             let found = radii::solve(program, &mut self.slides, limits);
             at_floor = self.note(&limits, found.first_norm);
             statistics += found.statistics;
-            (x, radii, outcome) = (found.x, found.radii, found.outcome);
+            (x, outcome) = (found.x, found.outcome);
+        } else {
+            let radii = self.slides.radii(&start);
+            self.slides.settle(&start, &radii);
         }
         let mut lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
         dual.project(&mut x);
         let balanced = start.iter().zip(&x).map(|(s, x)| s + x).collect();
-        self.slides.settle(&lambda, &radii);
         problem.laws().project(&mut lambda);
         let kept = problem.laws().kept(&lambda, 0.0);
         self.face = Some(timer.time("coarse set-up", || self.on_slides(coarse, kept)));

@@ -40,8 +40,6 @@ pub(super) struct Program<'a> {
 pub(super) struct Found {
     /// `l - l0`.
     pub x: Vec<f64>,
-    /// Radii of the last program.
-    pub radii: Vec<f64>,
     /// Norm of the projected gradient at the start.
     pub first_norm: f64,
     /// How it ended.
@@ -58,10 +56,10 @@ pub(super) fn solve(program: Program, slides: &mut Slides, limits: Limits) -> Fo
         false => FeasibleSet::above(lower.clone()),
     };
     let (mut x, mut radii) = (vec![0.0; b.len()], slides.radii(start));
-    let (mut statistics, mut first_norm, mut target) = (Statistics::default(), f64::NAN, f64::NAN);
+    let (mut statistics, mut first_norm) = (Statistics::default(), None);
     let mut now = Limits { drop: if has_friction { limits.drop.max(LOOSE) } else { limits.drop }, ..limits };
     let mut outcome = Outcome::LimitReached;
-    for round in 0..PROGRAMS {
+    for _ in 0..PROGRAMS {
         slides.carry(start, &mut x, &radii);
         now.products = limits.products.saturating_sub(statistics.hessian);
         let solution = smalse::solve(
@@ -69,18 +67,16 @@ pub(super) fn solve(program: Program, slides: &mut Slides, limits: Limits) -> Fo
             &smalse::Settings { limits: now, norm },
             smalse::Start { x, multiplier },
         );
-        if round == 0 {
-            (first_norm, target) = (solution.first_norm, limits.target(solution.first_norm));
-            now.absolute = now.drop * first_norm;
-        }
+        let first_norm = *first_norm.get_or_insert(solution.first_norm);
         statistics += solution.statistics;
         x = solution.x;
+        let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
+        slides.settle(&lambda, &radii);
         if !has_friction || solution.outcome != Outcome::Converged {
             outcome = solution.outcome;
             break;
         }
-        let lambda: Vec<f64> = start.iter().zip(&x).map(|(s, x)| s + x).collect();
-        slides.settle(&lambda, &radii);
+        let target = limits.target(first_norm);
         let next = slides.radii(&lambda);
         let change = space.norm(&slides.change(&radii, &next, lambda.len()));
         if change.max(solution.gradient_norm).max(norm * solution.defect_norm) <= target {
@@ -88,7 +84,8 @@ pub(super) fn solve(program: Program, slides: &mut Slides, limits: Limits) -> Fo
             break;
         }
         (radii, multiplier) = (next, Some(solution.multiplier));
-        now = Limits { absolute: target.max(LOOSE * now.absolute), drop: 0.0, relative: 0.0, ..now };
+        let absolute = target.max(LOOSE * now.target(solution.first_norm));
+        now = Limits { absolute, drop: 0.0, relative: 0.0, ..now };
     }
-    Found { x, radii, first_norm, outcome, statistics }
+    Found { x, first_norm: first_norm.unwrap_or(f64::NAN), outcome, statistics }
 }

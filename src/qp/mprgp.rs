@@ -33,6 +33,7 @@ pub trait Hessian {
 }
 
 /// The iterate with what belongs to it.
+#[derive(Clone)]
 pub struct Point {
     /// The unknowns.
     pub x: Vec<f64>,
@@ -221,6 +222,11 @@ impl<'a> Mprgp<'a> {
                 statistics.expansions += 1;
             }
         }
+    }
+
+    /// What a stopping test sees at the point. One collective.
+    pub fn norms(&mut self, point: &Point) -> Norms {
+        self.measure(point).norms()
     }
 
     /// Splits the gradient at the point. One collective.

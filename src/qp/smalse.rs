@@ -14,7 +14,7 @@
 //! L follows from the gradient, the Q-part of a direction is a by-product of its product: a step costs one product with
 //! A and two projections. Convergence does not depend on the quality of the norm, a few per cent are plenty.
 
-use super::feasible::{FeasibleSet, Parts};
+use super::feasible::FeasibleSet;
 use super::mprgp::{Mprgp, Norms, Point};
 use super::penalty::Penalised;
 use super::quadratic::{Quadratic, Space};
@@ -93,7 +93,10 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let mut inner = Mprgp::new(space, set, penalty, settings.limits.products).with_size(norm);
     let mut statistics = Statistics::default();
     let mut point = first_point(space, &mut hessian, &right, x, &mut statistics);
-    let first = norm_without_penalty(space, set, &point, penalty);
+    // What a start violates is repaired at once, and says nothing of how far the solution is.
+    let mut without_penalty = point.clone();
+    axpy(-penalty, &point.defect, &mut without_penalty.gradient);
+    let first = inner.norms(&without_penalty).gradient;
 
     let mut tests = Tests { limits: settings.limits, norm, ratio: RATIO * norm, first, now: UNKNOWN, done: false };
     let mut cost_before = f64::NEG_INFINITY;
@@ -179,16 +182,6 @@ fn first_point(
         point.refresh(hessian, right, statistics);
     }
     point
-}
-
-/// Norm of the projected gradient at the start without what the penalty adds. What a start violates is repaired at once, and says
-/// nothing of how far the solution is.
-fn norm_without_penalty(space: &dyn Space, set: &FeasibleSet, point: &Point, penalty: f64) -> f64 {
-    let gradient: Vec<f64> = point.gradient.iter().zip(&point.defect).map(|(g, q)| g - penalty * q).collect();
-    let mut parts = Parts::new(gradient.len());
-    set.split(&point.x, &gradient, 1.0 / penalty, &mut parts);
-    let d = space.dots(&[(&parts.free, &parts.free), (&parts.chopped, &parts.chopped)]);
-    (d[0] + d[1]).sqrt()
 }
 
 const UNKNOWN: Norms = Norms { gradient: f64::NAN, defect: f64::NAN };
