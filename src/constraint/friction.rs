@@ -2,11 +2,12 @@
 //! plane of a contact pair.
 //!
 //! A pair with friction has two more rows of B, for orthonormal directions orthogonal to its normal. A direction that supports
-//! hold on all nodes of the pair has no row: what slides along it is prescribed, and friction along it acts on supports. Rows of
-//! one pair have one scale, so that a disc of forces is a disc of multipliers. Where a node has several conditions (edges,
+//! hold on both sides of the pair has no row: what slides along it is prescribed, and friction along it acts on supports. A side is
+//! held where the weights of its free nodes add up to less than a half. Next to a plane of symmetry the master has free nodes in the
+//! pair, but they count for little: such a row has next to no flexibility, and forces without limit. Rows of one pair have one scale, so that a disc of forces is a disc of multipliers. Where a node has several conditions (edges,
 //! corners) only directions have rows that are independent of all its normals: others would be held twice.
 
-use super::contact::{Side, nodes, row_along};
+use super::contact::{Side, row_along};
 use super::prescribed::Prescribed;
 use super::{Constraints, Kind, Row};
 use crate::contact::ContactPair;
@@ -37,11 +38,14 @@ pub struct Tangent {
     pub direction: [f64; 3],
 }
 
+/// A side of a pair moves along an axis if the weights of its nodes that supports leave free add up to more than this.
+const FREE: f64 = 0.5;
+
 /// A direction is in the plane of others up to this sine.
 const FLAT: f64 = 1e-6;
 
 /// Orthonormal directions for the friction rows of a pair: orthogonal to its normal, to the directions `taken` at its node, and to
-/// axes that are not `free` on any node.
+/// axes that are not `free`.
 pub(super) fn directions(normal: [f64; 3], free: [bool; 3], taken: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let axis = |a: usize| std::array::from_fn(|b| f64::from(a == b));
     let fixed = (0..3).filter(|&a| !free[a]).map(axis);
@@ -80,11 +84,12 @@ pub(super) fn rows<'a>(
     sides: &impl Fn(u64) -> Side<'a>,
     taken: &[[f64; 3]],
 ) -> Vec<(Row, [f64; 3])> {
-    let mut free = [false; 3];
-    for (node, factor) in nodes(pair) {
-        let supports = sides(node).1;
-        (0..3).for_each(|a| free[a] |= supports[a].is_none() && factor != 0.0);
-    }
+    let free = std::array::from_fn(|a| {
+        let of = |nodes: &[(u64, f64)]| -> f64 {
+            nodes.iter().filter(|(node, _)| sides(*node).1[a].is_none()).map(|(_, weight)| weight).sum()
+        };
+        of(&pair.slaves).max(of(&pair.masters)) > FREE
+    });
     let found = directions(pair.normal, free, taken).into_iter().zip(0..);
     let row = |(direction, axis): ([f64; 3], u8)| {
         let row = row_along(direction, Kind::Friction { pair: number, axis }, pair, sides).ok()?;

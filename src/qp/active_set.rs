@@ -5,10 +5,7 @@
 //! Kept rows with x_i < 0 are let go; other rows with a violated gap, (d - A x - G'a)_i > 0, are taken in.
 //!
 //! The equality problems are solved loosely. Each time the residual has dropped by a factor the set is checked, and PCPG
-//! goes on with its directions if the set stands. This can be too loose. Where stiffness jumps, the norm of the residual is
-//! that of the soft parts; the forces and gaps of stiff rows may still be wrong, and the sets may wander. So the equality
-//! problems are solved to the tolerance where stiffness jumps, more exactly after a correction that is much larger than an earlier one,
-//! and more exactly for good each time that a set comes back, to the tolerance in the end.
+//! goes on with its directions if the set stands. How loosely depends on how the sets go ([`exactness`]).
 //!
 //! Discs ([`super::slides`]) are corrected along with the bounds. Where none of them changes its set, radii and directions of slips
 //! follow once they are further off than the residual. Then the caller's `A` includes the springs across slips. Where radii grow with
@@ -18,19 +15,14 @@
 //! [`super::smalse`]. Unlike there x is not homogenised: bounds are zero and the equalities have a right-hand side,
 //! both the caller's affair, since the projector changes with the set.
 
+mod exactness;
+
+use self::exactness::{Exactness, LOOSE};
 use super::pcpg::{Directions, Pcpg};
 use super::quadratic::{Quadratic, Space};
 use super::slides::Slides;
 use super::{Limits, Outcome, Statistics, axpy};
 
-/// Factor by which the residual drops between two looks at the set.
-const LOOSE: f64 = 0.1;
-/// What it is multiplied by for a set after a large correction, and for good each time that a set comes back, ...
-const TIGHTER: f64 = 0.1;
-/// ... and the last before the tolerance.
-const LEAST: f64 = 1e-3;
-/// A correction that changes this many times more rows than the smallest so far: sets are corrected too early.
-const GROWTH: f64 = 2.0;
 /// Sets that are tried at most.
 const SETS: usize = 60;
 /// How often directions and radii of discs are followed at most.
@@ -137,30 +129,28 @@ struct Run<'a> {
 impl Run<'_> {
     /// Alternates between solving and correcting the set. x starts on each set as near to `wish` as the set allows.
     fn iterate(&mut self, face: &mut dyn Face, solver: &mut Pcpg, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
-        let mut target = None;
-        // The sets so far, and how far the residual of each drops before it is corrected.
-        let (mut history, mut loose) = (vec![self.names()], if self.uneven { 0.0 } else { LOOSE });
-        let (mut smallest, mut wanders) = (f64::INFINITY, false);
+        let (mut target, mut floor) = (None, 0.0);
+        let mut exactness = Exactness::new(self.names(), if self.uneven { 0.0 } else { LOOSE });
         let mut follows = 0;
-        while history.len() <= SETS && follows < FOLLOWS {
+        while exactness.history.len() <= SETS && follows < FOLLOWS {
             self.move_to(face, &mut wish);
             self.statistics.sets += 1;
-            if target.is_none() {
+            let goal = *target.get_or_insert_with(|| {
                 self.first_norm = self.projected_norm(face);
-            }
-            let target = *target.get_or_insert(limits.target(self.first_norm));
-            let wary = std::mem::replace(&mut wanders, false);
-            let relative = if wary { loose * TIGHTER } else { loose };
+                floor = Limits { drop: 0.0, ..*limits }.target(self.first_norm);
+                limits.target(self.first_norm)
+            });
+            let relative = exactness.take_relative();
             let changes = loop {
                 let products = limits.products.saturating_sub(self.statistics.hessian);
-                let limits = Limits { relative, reference: None, absolute: target, drop: 0.0, products };
+                let limits = Limits { relative, reference: None, absolute: goal, drop: 0.0, products };
                 let report = solver.solve(face, &mut self.x, &mut self.residual, &limits);
                 self.statistics += report.statistics;
                 if report.outcome != Outcome::Converged {
                     return report.outcome;
                 }
-                match self.correct(face, target, report.norm) {
-                    Correction::None if report.norm <= target => return Outcome::Converged,
+                match self.correct(face, goal, report.norm) {
+                    Correction::None if report.norm <= goal => return Outcome::Converged,
                     Correction::None => {}
                     Correction::Shift if follows < FOLLOWS => {
                         follows += 1;
@@ -185,16 +175,15 @@ impl Run<'_> {
                 follows += 1;
                 continue;
             }
-            wanders = changes > GROWTH * smallest;
-            smallest = smallest.min(changes);
-            if self.seen(&history) {
-                if loose == 0.0 {
+            exactness.note(changes);
+            if self.seen(&exactness.history) {
+                if exactness.loose == 0.0 && goal <= floor {
                     return Outcome::Cycled;
                 }
-                loose = if loose > LEAST { loose * TIGHTER } else { 0.0 };
-                history.clear();
+                exactness.tighten();
+                target = Some(floor.max(exactness::TIGHTER * goal));
             }
-            history.push(self.names());
+            exactness.history.push(self.names());
         }
         Outcome::Cycled
     }

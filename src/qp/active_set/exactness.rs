@@ -1,0 +1,85 @@
+//! How exactly an active set's equality problems are solved.
+//!
+//! A factor on the residual decides when a set is corrected. It can be too loose. Where stiffness jumps, or bodies keep their volume,
+//! the norm of the residual is that of the soft parts; the forces and gaps of stiff rows may still be wrong, and the sets may wander. So
+//! the problems are solved to the tolerance where stiffness jumps, more exactly after a correction that is much larger than an earlier
+//! one, and more exactly for good when corrections do not become smaller for long, or a set comes back, to the tolerance in the end. A
+//! set that comes back lowers the tolerance of the program too, as far as that of the scene.
+
+/// Factor by which the residual drops between two looks at the set.
+pub(super) const LOOSE: f64 = 0.1;
+/// What it is multiplied by for a set after a large correction, and for good where sets come back or do not settle, ...
+pub(super) const TIGHTER: f64 = 0.1;
+/// ... and the last before the tolerance.
+const LEAST: f64 = 1e-3;
+/// A correction that changes this many times more rows than the smallest so far: sets are corrected too early.
+const GROWTH: f64 = 2.0;
+/// So many corrections without one that is smaller than all before: sets do not settle.
+const SLOW: usize = 6;
+
+/// The state of it.
+pub(super) struct Exactness {
+    /// The sets since that became more exact for good.
+    pub history: Vec<Vec<bool>>,
+    /// How far the residual drops before a set is corrected.
+    pub loose: f64,
+    /// Whether the next one is more exact.
+    wary: bool,
+    /// The smallest correction, and how many came after it.
+    smallest: (f64, usize),
+}
+
+impl Exactness {
+    pub fn new(first: Vec<bool>, loose: f64) -> Self {
+        Self { history: vec![first], loose, wary: false, smallest: (f64::INFINITY, 0) }
+    }
+
+    /// How far the residual drops on this set.
+    pub fn take_relative(&mut self) -> f64 {
+        if std::mem::take(&mut self.wary) { self.loose * TIGHTER } else { self.loose }
+    }
+
+    /// Takes note of a correction with so many changes.
+    pub fn note(&mut self, changes: f64) {
+        let (least, since) = self.smallest;
+        self.wary = changes > GROWTH * least;
+        self.smallest = if changes < least { (changes, 0) } else { (least, since + 1) };
+        if self.smallest.1 >= SLOW && self.loose > 0.0 {
+            self.tighten();
+        }
+    }
+
+    /// More exactly for good.
+    pub fn tighten(&mut self) {
+        self.loose = if self.loose > LEAST { self.loose * TIGHTER } else { 0.0 };
+        self.smallest.1 = 0;
+        self.history.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_that_do_not_settle_are_solved_more_exactly_for_good() {
+        let mut exactness = Exactness::new(vec![true], LOOSE);
+        for changes in [50.0, 40.0, 45.0, 41.0, 60.0, 70.0, 55.0] {
+            exactness.note(changes);
+            assert_eq!((exactness.take_relative(), exactness.history.len()), (LOOSE, 1), "{changes}");
+        }
+        exactness.note(42.0);
+        assert_eq!((exactness.take_relative(), exactness.history.len()), (LOOSE * TIGHTER, 0));
+        // A large one counts for the next set alone.
+        exactness.note(81.0);
+        assert_eq!(exactness.take_relative(), LOOSE * TIGHTER * TIGHTER);
+        assert_eq!(exactness.take_relative(), LOOSE * TIGHTER);
+        (0..3).for_each(|_| exactness.tighten());
+        // What is as exact as can be is not tried for ever.
+        for sets in 0..20 {
+            assert_eq!((exactness.take_relative(), exactness.history.len()), (0.0, sets));
+            exactness.note(70.0);
+            exactness.history.push(vec![false]);
+        }
+    }
+}
