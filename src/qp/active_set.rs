@@ -5,7 +5,7 @@
 //! Kept rows with x_i < 0 are let go; other rows with a violated gap, (d - A x - G'a)_i > 0, are taken in.
 //!
 //! The equality problems are solved loosely. Each time the residual has dropped by a factor the set is checked, and PCPG
-//! goes on with its directions if the set stands. How loosely depends on how the sets go ([`exactness`]).
+//! goes on with its directions if the set stands. How loosely depends on how the sets go (`exactness`).
 //!
 //! Discs ([`super::slides`]) are corrected along with the bounds. Where none of them changes its set, radii and directions of slips
 //! follow once they are further off than the residual. Then the caller's `A` includes the springs across slips. Where radii grow with
