@@ -49,6 +49,11 @@ pub trait Case: Sync {
         None
     }
 
+    /// A distance between all surfaces in contact, beside that of the scene, by place.
+    fn gap(&self) -> Option<fn([f64; 3]) -> f64> {
+        None
+    }
+
     /// How the history must end.
     fn end(&self, _: Kind) -> End {
         End::Reached

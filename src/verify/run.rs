@@ -6,6 +6,7 @@ use super::{Case, End, Error, Row};
 use crate::assembly::Region;
 use crate::assembly::loads::Load;
 use crate::comm::{Comm, all_gather_u64, exact, maximum};
+use crate::constraint;
 use crate::decomposition::Subdomain;
 use crate::element::Kind;
 use crate::element::sample::{Sample, samples};
@@ -52,6 +53,9 @@ impl<'a> Run<'a> {
         let mut discrete = model::discretise(&scene, comm)?;
         if let Some(value) = case.force() {
             discrete.loads[0] = Load::Field { body: 0, value, factor: 1.0 };
+        }
+        if let Some(gap) = case.gap() {
+            open(&mut discrete, comm, gap);
         }
         let solved = study::solve(&scene, &discrete, comm, study::Begin::Rest, &timer, &mut ())?;
         let seconds = timer.total_seconds();
@@ -230,6 +234,27 @@ impl<'a> Run<'a> {
             (number, Touch { place: [x, y, z], pressure, area, friction })
         });
         touches.collect::<BTreeMap<u64, Touch>>().into_values().collect()
+    }
+}
+
+/// Adds a distance to those of contact rows between surfaces whose nodes meet. Collective.
+fn open(discrete: &mut Discrete, comm: &dyn Comm, gap: impl Fn([f64; 3]) -> f64) {
+    let Discrete { decomposition, contacts, constraints, right_hand_sides, .. } = discrete;
+    let mut mine = Vec::new();
+    for subdomain in &decomposition.subdomains {
+        for (number, pair) in contacts.pairs.iter() {
+            if let Some(node) = subdomain.local_node(pair.slave) {
+                mine.extend([number as u64, gap(subdomain.points[node]).to_bits()]);
+            }
+        }
+    }
+    let all = all_gather_u64(comm, &mine);
+    let gaps: BTreeMap<u64, f64> = all.as_chunks().0.iter().map(|&[pair, gap]| (pair, f64::from_bits(gap))).collect();
+    for (row, of) in constraints.rows.iter().enumerate() {
+        let constraint::Kind::Contact { pair } = of.kind else { continue };
+        for rhs in right_hand_sides.ends.iter_mut().chain([&mut right_hand_sides.begin]) {
+            rhs[row] += of.scale * gaps[&(pair as u64)];
+        }
     }
 }
 
