@@ -4,8 +4,9 @@
 //! A pair with friction has two more rows of B, for orthonormal directions orthogonal to its normal. A direction that supports
 //! hold on both sides of the pair has no row: what slides along it is prescribed, and friction along it acts on supports. A side is
 //! held where the weights of its free nodes add up to less than a half. Next to a plane of symmetry the master has free nodes in the
-//! pair, but they count for little: such a row has next to no flexibility, and forces without limit. Rows of one pair have one scale, so that a disc of forces is a disc of multipliers. Where a node has several conditions (edges,
-//! corners) only directions have rows that are independent of all its normals: others would be held twice.
+//! pair, but they count for little: such a row has next to no flexibility, and forces without limit. Rows of one pair have one
+//! scale, so that a disc of forces is a disc of multipliers. Where a node has several conditions (edges, corners) only directions
+//! have rows that are independent of all its normals: others would be held twice.
 
 use super::contact::{Side, row_along};
 use super::prescribed::Prescribed;

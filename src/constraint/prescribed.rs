@@ -62,6 +62,15 @@ impl Row {
 }
 
 impl Constraints {
+    /// Adds to right-hand sides what the `gap` of each contact pair is wider by (length); for rows without parallel conditions.
+    pub fn add_gaps(&self, gap: impl Fn(usize) -> f64, rhs: &mut [f64]) {
+        for (row, rhs) in self.rows.iter().zip(rhs) {
+            if let Kind::Contact { pair } = row.kind {
+                *rhs += row.scale * gap(pair);
+            }
+        }
+    }
+
     /// Right-hand sides of all rows.
     pub fn right_hand_sides(&self, at: &Prescribed) -> Vec<f64> {
         let mut rhs: Vec<f64> = self.rows.iter().map(|row| row.right_hand_side(at)).collect();

@@ -12,7 +12,7 @@ use crate::analytic::mindlin::Line;
 use crate::element::Kind;
 use crate::material::VonMises;
 
-pub(super) const BLOCK: VonMises = VonMises::elastic(150_000.0, 0.45);
+const BLOCK: VonMises = VonMises::elastic(150_000.0, 0.45);
 pub(super) const RADIUS: f64 = 50.0;
 pub(super) const FRICTION: f64 = 0.3;
 /// Makes half a width of contact of about 0.8, and friction of about half of what would make all of it slip.

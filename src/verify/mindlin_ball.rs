@@ -61,8 +61,8 @@ impl Case for Ball {
     }
 
     fn levels(&self, element: Kind) -> Vec<usize> {
-        // Tetrahedra need smaller cells far away.
-        if element == Kind::Hex8 { vec![1] } else { Vec::new() }
+        // Quadratic ones have about eight times as many nodes.
+        if element.degree() == 1 { vec![1] } else { Vec::new() }
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {

@@ -6,7 +6,7 @@ use super::{Case, End, Error, Row};
 use crate::assembly::Region;
 use crate::assembly::loads::Load;
 use crate::comm::{Comm, all_gather_u64, exact, maximum};
-use crate::constraint;
+use crate::contact::ContactPair;
 use crate::decomposition::Subdomain;
 use crate::element::Kind;
 use crate::element::sample::{Sample, samples};
@@ -215,18 +215,12 @@ impl<'a> Run<'a> {
     pub fn contacts(&self) -> Vec<Touch> {
         let found = self.solved.piece.last("contact_pressure").expect("results have this field");
         let rubbed = self.solved.piece.last("friction_traction").map(|found| found.as_chunks::<3>().0);
-        let (mut mine, mut first) = (Vec::new(), 0);
-        for (subdomain, _) in self.subdomains() {
-            for (number, pair) in self.discrete.contacts.pairs.iter() {
-                if let Some(node) = subdomain.local_node(pair.slave) {
-                    let [x, y, z] = subdomain.points[node];
-                    mine.push(number as u64);
-                    let [u, v, w] = rubbed.map_or([0.0; 3], |rubbed| rubbed[first + node]);
-                    mine.extend([x, y, z, found[first + node], pair.area, u, v, w].map(f64::to_bits));
-                }
-            }
-            first += subdomain.nodes.len();
-        }
+        let mut mine = Vec::new();
+        each_slave(&self.discrete, |number, pair, [x, y, z], node| {
+            mine.push(number as u64);
+            let [u, v, w] = rubbed.map_or([0.0; 3], |rubbed| rubbed[node]);
+            mine.extend([x, y, z, found[node], pair.area, u, v, w].map(f64::to_bits));
+        });
         // All copies of a node show the same.
         let all = all_gather_u64(self.comm, &mine);
         let touches = all.as_chunks::<9>().0.iter().map(|&[number, ref numbers @ ..]| {
@@ -237,24 +231,28 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Adds a distance to those of contact rows between surfaces whose nodes meet. Collective.
-fn open(discrete: &mut Discrete, comm: &dyn Comm, gap: impl Fn([f64; 3]) -> f64) {
-    let Discrete { decomposition, contacts, constraints, right_hand_sides, .. } = discrete;
-    let mut mine = Vec::new();
-    for subdomain in &decomposition.subdomains {
-        for (number, pair) in contacts.pairs.iter() {
+/// Every own copy of a slave node: number of the condition, the condition, place, and index of the node in the results of the rank.
+fn each_slave(discrete: &Discrete, mut tell: impl FnMut(usize, &ContactPair, [f64; 3], usize)) {
+    let mut first = 0;
+    for subdomain in &discrete.decomposition.subdomains {
+        for (number, pair) in discrete.contacts.pairs.iter() {
             if let Some(node) = subdomain.local_node(pair.slave) {
-                mine.extend([number as u64, gap(subdomain.points[node]).to_bits()]);
+                tell(number, pair, subdomain.points[node], first + node);
             }
         }
+        first += subdomain.nodes.len();
     }
+}
+
+/// Adds a distance to those of contact rows between surfaces whose nodes meet. Collective.
+fn open(discrete: &mut Discrete, comm: &dyn Comm, gap: impl Fn([f64; 3]) -> f64) {
+    let mut mine = Vec::new();
+    each_slave(discrete, |number, _, x, _| mine.extend([number as u64, gap(x).to_bits()]));
     let all = all_gather_u64(comm, &mine);
     let gaps: BTreeMap<u64, f64> = all.as_chunks().0.iter().map(|&[pair, gap]| (pair, f64::from_bits(gap))).collect();
-    for (row, of) in constraints.rows.iter().enumerate() {
-        let constraint::Kind::Contact { pair } = of.kind else { continue };
-        for rhs in right_hand_sides.ends.iter_mut().chain([&mut right_hand_sides.begin]) {
-            rhs[row] += of.scale * gaps[&(pair as u64)];
-        }
+    let Discrete { constraints, right_hand_sides, .. } = discrete;
+    for rhs in right_hand_sides.ends.iter_mut().chain([&mut right_hand_sides.begin]) {
+        constraints.add_gaps(|pair| gaps[&(pair as u64)], rhs);
     }
 }
 

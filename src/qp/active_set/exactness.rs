@@ -25,13 +25,15 @@ pub(super) struct Exactness {
     pub loose: f64,
     /// Whether the next one is more exact.
     wary: bool,
-    /// The smallest correction, and how many came after it.
-    smallest: (f64, usize),
+    /// The smallest correction so far, ...
+    smallest: f64,
+    /// ... and how many came after it, or after that became more exact.
+    since: usize,
 }
 
 impl Exactness {
     pub fn new(first: Vec<bool>, loose: f64) -> Self {
-        Self { history: vec![first], loose, wary: false, smallest: (f64::INFINITY, 0) }
+        Self { history: vec![first], loose, wary: false, smallest: f64::INFINITY, since: 0 }
     }
 
     /// How far the residual drops on this set.
@@ -41,10 +43,10 @@ impl Exactness {
 
     /// Takes note of a correction with so many changes.
     pub fn note(&mut self, changes: f64) {
-        let (least, since) = self.smallest;
-        self.wary = changes > GROWTH * least;
-        self.smallest = if changes < least { (changes, 0) } else { (least, since + 1) };
-        if self.smallest.1 >= SLOW && self.loose > 0.0 {
+        self.wary = changes > GROWTH * self.smallest;
+        self.since = if changes < self.smallest { 0 } else { self.since + 1 };
+        self.smallest = self.smallest.min(changes);
+        if self.since >= SLOW && self.loose > 0.0 {
             self.tighten();
         }
     }
@@ -52,7 +54,7 @@ impl Exactness {
     /// More exactly for good.
     pub fn tighten(&mut self) {
         self.loose = if self.loose > LEAST { self.loose * TIGHTER } else { 0.0 };
-        self.smallest.1 = 0;
+        self.since = 0;
         self.history.clear();
     }
 }
