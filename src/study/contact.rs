@@ -1,6 +1,7 @@
 //! Contact at the nodes of the mesh: pressure on both sides, gap and status on the slave's.
 //!
-//! The pressure of a condition is its force over its area. A node of the master surface has the mean of the conditions around the
+//! The pressure of a condition is its force over its area. So is its friction stress; where a limit of the stress is given it is over
+//! the area that the limit counts, which has what is beyond the edge of the other surface in it, too. A node of the master surface has the mean of the conditions around the
 //! place opposite, weighted by the slave's linear functions there. A node of several contacts, or of several smooth parts of one,
 //! shows the largest of its pressures and the smallest of its gaps; where contacts share nodes each has a field of its own beside
 //! these. Nodes beyond the edge of the other surface touch nothing, and show nothing.
@@ -86,8 +87,10 @@ impl<'a> Known<'a> {
     fn new(Contacts { pairs, masters, .. }: &'a Contacts, states: &'a [ContactState]) -> Self {
         let pressures = states.iter().map(|state| (state.pair, state.force / pairs[state.pair].area)).collect();
         let rubbed = states.iter().filter_map(|state| {
-            let Rubbing { force, total, .. } = state.friction?;
-            Some((state.pair, [force.map(|f| f / pairs[state.pair].area), total]))
+            let Rubbing { force, total, is_given, .. } = state.friction?;
+            let pair = &pairs[state.pair];
+            let area = if is_given { pair.share } else { pair.area };
+            Some((state.pair, [force.map(|f| f / area), total]))
         });
         let rubbed = rubbed.collect();
         let covered = states.iter().filter(|state| pairs[state.pair].covered);

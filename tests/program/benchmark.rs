@@ -1,19 +1,13 @@
 //! The paper's benchmark: sizes of its Table 2, and solutions against those of an independent monolithic solver.
 
-use std::fs;
-use std::path::PathBuf;
-
 use crate::common::fields::Fields;
-use crate::common::{Run, assert_close, assert_near, assert_residuals, check, number, solve, solve_level, vector};
+use crate::common::{
+    Run, assert_close, assert_near, assert_residuals, check, number, reference, solve, solve_level, vector,
+};
 use serde_json::Value;
 
 /// Hessian multiplications that the paper reports at level 1.
 const PAPER_MULTIPLICATIONS: f64 = 1951.0;
-
-fn reference(name: &str) -> Value {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/reference/{name}.json"));
-    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
-}
 
 /// Everything that the reference has, to 1e-6, and the counts exactly.
 fn assert_agrees(run: &Run, name: &str) {

@@ -1,8 +1,11 @@
 //! Friction: closed forms, an independent program's numbers, and what must be refused.
 
+use std::collections::BTreeMap;
+
 use crate::common::fields::{Fields, state_at};
 use crate::common::{
-    assert_close, assert_near, number, run_briefly, run_misused, scene_file, solve, solve_tightly, vector,
+    assert_close, assert_near, distance, number, reference, run_briefly, run_misused, scene_file, solve, solve_tightly,
+    vector,
 };
 use serde_json::Value;
 
@@ -227,26 +230,50 @@ fn a_pulled_bar_slips_as_far_as_friction_takes_and_keeps_half_of_it() {
     assert_eq!(bits(0), bits(1), "the same bits on any ranks");
 }
 
-/// The benchmark of the paper with friction, against an independent monolithic program.
+/// The benchmark of the paper with friction, against an independent monolithic program: node by node, too.
 #[test]
 fn the_benchmark_with_friction_is_that_of_an_independent_program() {
-    let references = [
-        (&["contact.joint.friction=0.3"][..], -1146151385.787, [61868694.19, 172934.66, 206615059.700], [0, 81], 5661),
-        (
-            &["contact.joint.shear_limit=10.0"],
-            -1181002843.212,
-            [24222683.38, -145518.85, 198649388.276],
-            [0, 275],
-            6424,
-        ),
-    ];
-    for (sets, energy, force, counts, plastic) in references {
-        let summary = solve_tightly(2, "two-blocks", sets).summary();
-        assert_close("J", number(&summary, "energy"), energy, 1e-9);
-        assert_near("contact force", vector(&summary["contact_force"]), force, 1e-9);
-        assert_eq!(number(&summary, "plastic_elements") as usize, plastic);
+    let reference = reference("level1-friction");
+    let cases = reference["cases"].as_array().unwrap();
+    let of_nodes = |case: &Value| -> Vec<[f64; 5]> {
+        let node = |node: &Value| std::array::from_fn(|k| node[k].as_f64().unwrap());
+        case["nodes"].as_array().unwrap().iter().map(node).collect()
+    };
+    // Where all slips at a given limit, forces are that times the area of the node.
+    let limit = number(&reference, "shear_limit");
+    let given =
+        of_nodes(&cases[2]).into_iter().map(|[x, y, fx, fy, _]| ([x, y].map(f64::to_bits), fx.hypot(fy) / limit));
+    let area: BTreeMap<[u64; 2], f64> = given.collect();
+    for case in cases {
+        let sets: Vec<&str> = case["sets"].as_array().unwrap().iter().map(|set| set.as_str().unwrap()).collect();
+        let run = solve_tightly(2, "two-blocks", &sets);
+        let summary = run.summary();
+        for key in ["energy", "external_work", "max_displacement", "max_von_mises"] {
+            assert_close(key, number(&summary, key), number(case, key), 1e-9);
+        }
+        assert_near("contact force", vector(&summary["contact_force"]), vector(&case["contact_force"]), 1e-9);
+        let dissipation = rubbed(&summary, "joint", "dissipation").as_f64().unwrap();
+        assert_close("dissipation", dissipation, number(case, "dissipation"), 1e-9);
+        assert_eq!(summary["plastic_elements"], case["plastic_elements"]);
+        let nodes = of_nodes(case);
         let found = ["sticking", "slipping"].map(|key| rubbed(&summary, "joint", key).as_u64().unwrap());
-        assert_eq!(found, counts, "{sets:?}");
+        assert_eq!(found, [0, nodes.len() as u64], "{sets:?}");
+
+        let fields = Fields::read(&run.result());
+        let (bodies, pressure) = (fields.body_of_points(), fields.of_points("contact_pressure"));
+        let traction = fields.of_points("friction_traction");
+        let largest = nodes.iter().flat_map(|node| &node[2..]).fold(0.0, |most, force| force.abs().max(most));
+        for [x, y, force @ ..] in nodes {
+            let is_upper = |k: &usize| bodies[*k] == 1 && fields.points[*k] == [x, y, 1000.0];
+            let copies: Vec<usize> = (0..bodies.len()).filter(is_upper).collect();
+            assert!(!copies.is_empty(), "no node at {x}, {y}");
+            for copy in copies {
+                let [tx, ty, _] = traction.as_chunks::<3>().0[copy];
+                let found = [tx, ty, pressure[copy]].map(|stress| stress * area[&[x, y].map(f64::to_bits)]);
+                let off = distance(found, force) / largest;
+                assert!(off < 1e-9, "{sets:?} at {x}, {y}: {found:?}, not {force:?}");
+            }
+        }
     }
 }
 
