@@ -9,7 +9,7 @@ use crate::feti::Torn;
 impl TornProblem<'_> {
     /// Commits the end of an increment: from now on the problem is the next one. Collective.
     pub fn commit(&mut self, Iterate { u, state, lambda, energies, .. }: &Iterate) {
-        self.committed.energies = *energies;
+        self.committed.energies = energies.unwrap_or_default();
         let sizes = Sizes { elastic_norm: self.elastic_norm(u), ..self.measure(u, state, lambda).1 };
         self.committed.sizes = self.committed.sizes.larger(sizes);
         self.commit_slips(&self.slack(u));

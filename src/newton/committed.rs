@@ -14,8 +14,8 @@ pub struct Committed {
     pub slips: Vec<f64>,
     /// Least sizes that relative errors refer to.
     pub sizes: Sizes,
-    /// Energies since the beginning; unknown after a result that others go on from.
-    pub energies: Option<Energies>,
+    /// Energies since the beginning.
+    pub energies: Energies,
 }
 
 /// The largest values of the increments so far. After an unloading errors are of the size of the values before.

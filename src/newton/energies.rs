@@ -11,6 +11,8 @@
 //! Both sides come from different numbers: loads and reactions from nodes, stored and plastic work from elements, the rest from
 //! contact rows. They agree where the ends are in equilibrium. The work of closing vanishes with the size of increments.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::iterate::Iterate;
@@ -65,24 +67,25 @@ impl Energies {
 }
 
 impl Newton<'_> {
-    /// Those up to the iterate, where this is an equilibrium. Unknown where a history goes on from a result, and
-    /// where loads follow the work they do. Collective.
-    pub(super) fn energies(&self) -> Option<Energies> {
+    /// Those up to the iterate, where this is an equilibrium. Where loads follow the work they do it is one increment from rest.
+    /// Collective.
+    pub(super) fn energies(&self) -> Energies {
         let (problem, Iterate { u, state, lambda, .. }) = (&self.problem, &self.iterate);
-        let before = problem.committed.energies.filter(|_| self.control.is_none())?;
-        let rest;
-        let from = match &self.reached {
-            Some(reached) => reached,
-            None => {
-                rest = Reached { u: problem.gather.zeros(), lambda: vec![0.0; problem.gather.rows()] };
-                &rest
-            }
+        let reached = self.reached.as_ref().filter(|_| self.control.is_none());
+        let start = || Reached {
+            u: self.origin.clone().unwrap_or_else(|| problem.gather.zeros()),
+            lambda: vec![0.0; problem.gather.rows()],
         };
-        let Conditions { loads, rhs, .. } = self.path.before(self.attempt);
+        let from = reached.map_or_else(|| Cow::Owned(start()), Cow::Borrowed);
+        let Conditions { mut loads, rhs, .. } = self.path.before(self.attempt);
         let state_before = problem.evaluate(&from.u);
+        if reached.is_none() {
+            // What holds an earlier run where it ended is let go.
+            loads.clone_from(&state_before.forces);
+        }
         let begin = End { u: &from.u, state: &state_before, lambda: &from.lambda, loads: &loads, rhs: &rhs };
         let end = End { u, state, lambda, loads: &problem.loads, rhs: &problem.rhs };
-        Some(before.and(problem.increment_of_work(&begin, &end), SIGNIFICANT * state.terms.energy))
+        problem.committed.energies.and(problem.increment_of_work(&begin, &end), SIGNIFICANT * state.terms.energy)
     }
 }
 

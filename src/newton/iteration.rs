@@ -8,7 +8,7 @@ use std::mem::{replace, take};
 
 use super::control::{Control, firm};
 use super::damping::{self, Damped};
-use super::forcing::{self, Forcing};
+use super::forcing::Forcing;
 use super::iterate::{self, Iterate};
 use super::outcome::{Next, Outcome, StepRecord};
 use super::path::{At, Attempt, Path};
@@ -22,6 +22,10 @@ use crate::qp;
 
 /// How often a step that does not lower the energy is tried again, more exactly each time.
 const TRIALS: usize = 3;
+
+/// A body is not held if so many steps in a row leave forces on subdomains out of balance. Factors are in double precision from the
+/// second on: that is no rounding.
+const UNHELD: usize = 10;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +61,8 @@ pub struct Newton<'a> {
     pub(super) forcing: Forcing,
     pub(super) outcome: Option<Outcome>,
     pub(super) reached: Option<Reached>,
+    /// The displacement of an earlier run that the history goes on from.
+    pub(super) origin: Option<Torn>,
     pub(super) steps: Vec<(usize, StepRecord)>,
     /// Steps of attempts before this one.
     pub(super) before: usize,
@@ -82,15 +88,17 @@ impl<'a> Newton<'a> {
         };
         let rest = |problem: &TornProblem| (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
         let (mut attempt, mut forcing) = (Attempt::FIRST, Forcing::default());
-        let (mut reached, mut steps, mut before, mut stood, mut reach) = (None, Vec::new(), 0, None, None);
+        let (mut reached, mut origin, mut steps, mut before, mut stood, mut reach) =
+            (None, None, Vec::new(), 0, None, None);
         let ((u, lambda), kept) = match begin {
             Begin::Rest => (rest(&problem), None),
             Begin::Near(start) => {
-                reach = start.reach;
+                (reach, origin) = (start.reach, start.is_origin.then(|| start.u.clone()));
                 ((start.u, rest(&problem).1), Some(start.kept))
             }
             Begin::At(snapshot) => {
-                (attempt, forcing, reached) = (snapshot.attempt, snapshot.forcing, snapshot.reached);
+                (attempt, forcing) = (snapshot.attempt, snapshot.forcing);
+                (reached, origin) = (snapshot.reached, snapshot.origin);
                 (steps, before, stood, reach) =
                     (snapshot.steps, snapshot.before, Some(snapshot.solver), snapshot.reach);
                 problem.committed = snapshot.committed;
@@ -115,6 +123,7 @@ impl<'a> Newton<'a> {
             forcing,
             outcome,
             reached,
+            origin,
             steps,
             before,
             control,
@@ -127,6 +136,7 @@ impl<'a> Newton<'a> {
             attempt: self.attempt,
             committed: self.problem.committed.clone(),
             reached: self.reached.clone(),
+            origin: self.origin.clone(),
             steps: self.steps.clone(),
             before: self.before,
             u: self.iterate.u.clone(),
@@ -218,7 +228,7 @@ impl<'a> Newton<'a> {
         let Self { problem, solver, iterate, forcing, steps, control, .. } = self;
         let own = &steps[self.before..];
         // Where rounding spoiled the last step factors have to be in double precision.
-        if own.last().is_some_and(|(_, step)| step.local_residual > forcing::LOOSEST) {
+        if own.last().is_some_and(|(_, step)| step.is_spoiled()) {
             solver.sharpen();
         }
         let goes_on = self.settings.accuracy.is_none();
@@ -306,7 +316,12 @@ impl<'a> Newton<'a> {
         if program == qp::Outcome::LimitReached {
             return Some(Outcome::Inner(program));
         }
-        (self.steps.len() - self.before >= settings.limit).then_some(Outcome::LimitReached)
+        let own = &self.steps[self.before..];
+        let spoiled = own.iter().rev().take_while(|(_, step)| step.is_spoiled()).count();
+        if spoiled >= UNHELD {
+            return Some(Outcome::Unheld);
+        }
+        (own.len() >= settings.limit).then_some(Outcome::LimitReached)
     }
 
     /// Ends the iteration, and finds out how exact the iterate is.
@@ -317,7 +332,7 @@ impl<'a> Newton<'a> {
             iterate.errors = Some(solver.errors(problem, (&iterate.u, &iterate.state), &iterate.lambda, timer));
         }
         if outcome == Outcome::Converged {
-            self.iterate.energies = timer.time("residuals", || self.energies());
+            self.iterate.energies = Some(timer.time("residuals", || self.energies()));
         }
         self.outcome = Some(outcome);
     }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::forcing::LOOSEST;
 use super::path::At;
 use crate::qp;
 
@@ -24,6 +25,8 @@ pub enum Outcome {
     Unlimited,
     /// A tangent stiffness is singular beyond its rigid motions.
     Singular(String),
+    /// Nothing balances the loads on some body, step after step.
+    Unheld,
 }
 
 impl Outcome {
@@ -46,6 +49,9 @@ impl Outcome {
                 "loads that grow are borne without a limit: perhaps by elastic or hardening parts, or by linear elements, which lock".into()
             }
             Self::Singular(message) => message.clone(),
+            Self::Unheld => "nothing balances the loads on a body: what contact or friction held there has let go; add a support, or a load that \
+                             presses it against a contact"
+                .into(),
         })
     }
 }
@@ -88,4 +94,11 @@ pub struct StepRecord {
     pub factorisations: usize,
     /// Wall time.
     pub seconds: f64,
+}
+
+impl StepRecord {
+    /// Whether forces on subdomains are further out of balance than the loosest quadratic program leaves them.
+    pub fn is_spoiled(&self) -> bool {
+        self.local_residual > LOOSEST
+    }
 }

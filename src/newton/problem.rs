@@ -4,7 +4,6 @@ use crate::vector::dot;
 use std::cell::RefCell;
 
 use super::committed::Committed;
-use super::energies::Energies;
 use crate::assembly::Region;
 use crate::assembly::internal::{self, Terms};
 use crate::constraint::Constraints;
@@ -96,7 +95,7 @@ impl<'a> TornProblem<'a> {
             modes: connection.modes(),
             loads,
             rhs,
-            committed: Committed { energies: Some(Energies::default()), ..Committed::default() },
+            committed: Committed::default(),
             constraints,
             gather: &connection.gather,
             coupling: RefCell::new(Coupling::new(constraints)),

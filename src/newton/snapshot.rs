@@ -17,6 +17,8 @@ pub struct Snapshot {
     pub committed: Committed,
     /// The last increment that was reached.
     pub reached: Option<Reached>,
+    /// The displacement of an earlier run that the history goes on from.
+    pub origin: Option<Torn>,
     /// All Newton steps so far, with the number of the increment.
     pub steps: Vec<(usize, StepRecord)>,
     /// How many of them belong to attempts before this one.
@@ -61,6 +63,8 @@ pub struct Start {
     pub u: Torn,
     /// Rows that are kept there: all equalities and the closed contacts.
     pub kept: Vec<bool>,
+    /// Whether it is the end of an earlier run that the history goes on from.
+    pub is_origin: bool,
     /// Where loads are that follow the work they do.
     pub reach: Option<Reach>,
 }

@@ -144,7 +144,7 @@ fn read(
     let last = states.checked_sub(1).ok_or("it is damaged: it has fewer displacements than points")?;
     let u = places.at_nodes(&file, &nodes, (displacement, 3, last))?;
     file.close()?;
-    Ok(Earlier { committed: Committed { histories, sizes, slips: Vec::new(), energies: None }, u })
+    Ok(Earlier { committed: Committed { histories, sizes, ..Committed::default() }, u })
 }
 
 /// Nodes of a body by their numbers here; `None` if the body does not take its state from the file. Those that do have the

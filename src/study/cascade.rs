@@ -37,7 +37,12 @@ pub fn refine(comm: &dyn Comm, coarse: (&Discrete, &Solved), fine: &Discrete) ->
         Kind::Contact { pair } | Kind::Friction { pair, .. } => closed.contains(&pair),
         Kind::Gluing | Kind::Support { .. } => true,
     };
-    newton::Start { u, kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect(), reach: None }
+    newton::Start {
+        u,
+        kept: fine.constraints.rows.iter().map(|row| kept(row.kind)).collect(),
+        is_origin: false,
+        reach: None,
+    }
 }
 
 /// Which boxes of each body of a finer mesh (x fastest) are likely to yield: those around the coarse elements that yield. `None` if

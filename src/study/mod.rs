@@ -170,14 +170,14 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
                 problem.make_admissible(&mut u);
             }
             let reach = limit.map(|limit| Reach { work: Some(limit.work), factor: limit.factor, number: 1 });
-            newton::Begin::Near(newton::Start { u, kept, reach })
+            newton::Begin::Near(newton::Start { u, kept, is_origin: false, reach })
         }
         Begin::After(Earlier { committed, u }) => {
             let closed = ROUNDING * committed.sizes.displacement;
             let kept = problem.laws().kept_at(&problem.slack(&u), closed);
             problem.committed = committed;
             problem.commit_slips(&problem.slack(&u));
-            newton::Begin::Near(newton::Start { u, kept, reach: None })
+            newton::Begin::Near(newton::Start { u, kept, is_origin: true, reach: None })
         }
         Begin::At(standing) => {
             let Standing { newton, rows, recorded } = *standing;
@@ -234,6 +234,7 @@ fn iterate(
     let alive = |step: usize, applications: usize| {
         tell(Event::Inner { step: step as u64, hessian_multiplications: applications as u64 });
     };
+    let mut is_told = false;
     let outcome = loop {
         if let Some(outcome) = newton.outcome() {
             break outcome.clone();
@@ -247,7 +248,10 @@ fn iterate(
         }
         if let Some(record) = newton.step(timer, &alive) {
             tell(Event::NewtonStep(newton_row(number, record)));
-            loss_of_accuracy(record).into_iter().for_each(|text| tell(Event::Warning(text)));
+            if record.is_spoiled() && !is_told {
+                tell(Event::Warning(loss_of_accuracy(record)));
+                is_told = true;
+            }
         }
     };
     if outcome == Outcome::Converged {

@@ -80,14 +80,12 @@ pub(super) fn newton_row(increment: usize, record: &StepRecord) -> NewtonRow {
 }
 
 /// What to tell where rounding spoils a step more than the loosest quadratic program would.
-pub(super) fn loss_of_accuracy(record: &StepRecord) -> Option<String> {
+pub(super) fn loss_of_accuracy(record: &StepRecord) -> String {
     let StepRecord { number, local_residual, .. } = record;
-    (*local_residual > newton::forcing::LOOSEST).then(|| {
-        format!(
-            "Newton step {number} lost accuracy: stiffness matrices are so near to singular that rounding leaves {local_residual:.1e} \
-             of the forces on subdomains out of balance; factors are in double precision from here on"
-        )
-    })
+    format!(
+        "Newton step {number} lost accuracy: stiffness matrices are so near to singular that rounding leaves {local_residual:.1e} \
+         of the forces on subdomains out of balance; factors are in double precision from here on"
+    )
 }
 
 /// The Newton steps as columns of a table; with more than one increment the first says which.

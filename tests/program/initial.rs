@@ -3,10 +3,13 @@
 use std::path::Path;
 
 use crate::common::fields::{Fields, State, difference, state_at};
-use crate::common::{Run, assert_refused, assert_scene_refused, check, solve, solve_tightly};
+use crate::common::{
+    Run, assert_near, assert_refused, assert_scene_refused, check, number, solve, solve_tightly, vector,
+};
 use fetiplast::analytic::cycle::Cycle;
 use fetiplast::material::VonMises;
 use hdf5_metno::File;
+use serde_json::Value;
 
 /// Two blocks in contact, coarse, and with both kinds of hardening.
 fn blocks(element: &str) -> Vec<String> {
@@ -85,6 +88,34 @@ fn cycles_of_a_bar_may_be_taken_one_run_at_a_time() {
             assert!((kappa / exact.kappa - 1.0).abs() < 1e-8, "{kappa} at {stress}, not {}", exact.kappa);
         }
         before = Some(run);
+    }
+}
+
+/// What has slid is where friction goes on from, and energies count from the end of the earlier run.
+#[test]
+fn friction_and_energies_go_on_from_the_result_of_another_run() {
+    let sets = blocks("hex8");
+    let solve = |more: &[&str]| {
+        let sets = sets.iter().map(String::as_str).chain(["contact.joint.friction=0.3"]).chain(more.iter().copied());
+        solve_tightly(2, "two-blocks", &sets.collect::<Vec<_>>())
+    };
+    let (four, seven) = ("decomposition.subdomains=4", "decomposition.subdomains=7");
+    let pressed = solve(&[four]);
+    let start = from(&pressed.result());
+    let energy = |summary: &Value, name: &str| number(&summary["energies"], name);
+    for amplitude in [1.0, 0.2] {
+        let history = solve(&[four, &format!("step=[{{}}, {{amplitude={amplitude}}}]")]);
+        let run = solve(&[seven, &format!("step=[{{amplitude={amplitude}}}]"), &start]);
+        let errors = [last(&history.result()), last(&run.result())];
+        assert!(difference(&errors[0].0, &errors[1].0) < 1e-9, "at {amplitude}");
+        let [summary, whole, before] = [&run, &history, &pressed].map(Run::summary);
+        assert_near("contact force", vector(&summary["contact_force"]), vector(&whole["contact_force"]), 1e-8);
+        assert!(number(&summary, "residual_energies") < 1e-9, "{}", summary["energies"]);
+        for name in ["stored", "plastic", "friction"] {
+            let since = energy(&whole, name) - energy(&before, name);
+            let off = (energy(&summary, name) - since).abs() / energy(&before, "external");
+            assert!(off < 1e-9, "{name} at {amplitude}: {} and {since}", energy(&summary, name));
+        }
     }
 }
 

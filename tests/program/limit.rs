@@ -94,6 +94,7 @@ fn the_limit_is_that_of_strength_alone() {
 fn the_weakest_part_decides() {
     let sets = ["material.stamp.yield_stress=1000", "material.ground.yield_stress=1e9"];
     let summary = solve(1, STRIP, &sets).converged().summary();
+    assert!(number(&summary, "residual_energies") < 1e-3, "{}", summary["energies"]);
     let [lower, upper, _] = bounds(&summary, 0.01);
     let wanted = 2.0 / 3f64.sqrt() * 1000.0 / 2519.3551;
     assert!((lower / wanted - 1.0).abs() < 1e-2 && (upper / wanted - 1.0).abs() < 1e-2, "{lower} to {upper}");

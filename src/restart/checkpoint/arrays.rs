@@ -86,12 +86,13 @@ impl<'a> Packer<'a> {
     fn points(&self) -> Vec<Field> {
         let own = self.own();
         let zero = || own.iter().map(|s| vec![0.0; s.dofs()]).collect::<Torn>();
-        let reached = self.newton.reached.as_ref().map_or_else(zero, |reached| reached.u.clone());
+        let Snapshot { reached, origin, .. } = self.newton;
+        let last = reached.as_ref().map(|reached| &reached.u).or(origin.as_ref()).cloned().unwrap_or_else(zero);
         let elements = own.iter().flat_map(|s| s.elements.iter().flat_map(|element| key(element, &s.nodes)));
         vec![
             Field::integer("points/node", own.iter().flat_map(|s| &s.nodes).map(|&node| node as i64).collect()),
             vector("points/displacement", self.newton.u.concat()),
-            vector("points/last", reached.concat()),
+            vector("points/last", last.concat()),
             vector("points/factor", displacements(&self.factor, zero())),
             vector("points/interior", displacements(&self.interior, zero())),
             Field::of("cells/nodes", 4, Values::Integer(elements.collect())),

@@ -51,7 +51,7 @@ struct Numbers {
     meshes: Vec<u64>,
     attempt: Attempt,
     sizes: Sizes,
-    energies: Option<Energies>,
+    energies: Energies,
     has_reached: bool,
     /// Of all attempts, with the number of the increment.
     steps: Vec<(usize, StepRecord)>,
@@ -102,7 +102,7 @@ impl Recorded {
 /// What a checkpoint has in arrays, on own subdomains.
 struct Arrays {
     u: Torn,
-    /// Of the last increment that was reached.
+    /// Of the last increment that was reached, or of where the history goes on from.
     reached_u: Torn,
     lambda: Vec<f64>,
     reached_lambda: Vec<f64>,
@@ -214,7 +214,10 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
     let norm = numbers.norm.filter(|_| !is_recut);
     let programs = ProgramState { kept: of_programs, reference: numbers.reference, first: numbers.first, norm };
     let precision = if numbers.is_double { Precision::Double } else { Precision::Single };
-    let reached = numbers.has_reached.then_some(Reached { u: arrays.reached_u, lambda: arrays.reached_lambda });
+    let (reached, origin) = match numbers.has_reached {
+        true => (Some(Reached { u: arrays.reached_u, lambda: arrays.reached_lambda }), None),
+        false => (None, Some(arrays.reached_u)),
+    };
     let newton = Snapshot {
         attempt: numbers.attempt,
         committed: Committed {
@@ -224,6 +227,7 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
             energies: numbers.energies,
         },
         reached,
+        origin,
         steps: numbers.steps,
         before: numbers.before,
         u: arrays.u,
