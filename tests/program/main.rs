@@ -34,5 +34,6 @@ mod results;
 mod rigid;
 mod ring;
 mod rubbing;
+mod rubbing_twins;
 mod twins;
 mod verify;

@@ -16,29 +16,29 @@ const FEW: usize = 60;
 
 impl Random {
     /// Uniform in a range, in steps of a thousandth of it.
-    fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.below(1001) as f64 / 1000.0
     }
 
-    fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
+    pub fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
         all[self.below(all.len())]
     }
 }
 
 /// A box: along x and y its beginning, size and cells; its height and cells along it.
 #[derive(Clone, Copy, Debug)]
-struct Block {
-    begin: [f64; 2],
-    size: [f64; 2],
-    cells: [usize; 2],
-    height: f64,
-    layers: usize,
-    element: &'static str,
-    young: f64,
+pub struct Block {
+    pub begin: [f64; 2],
+    pub size: [f64; 2],
+    pub cells: [usize; 2],
+    pub height: f64,
+    pub layers: usize,
+    pub element: &'static str,
+    pub young: f64,
 }
 
 impl Block {
-    fn random(random: &mut Random) -> Self {
+    pub fn random(random: &mut Random) -> Self {
         Self {
             begin: [0.0; 2],
             size: [random.within(0.5, 2.0), random.within(0.5, 2.0)],
@@ -50,13 +50,24 @@ impl Block {
         }
     }
 
-    fn toml(&self, name: &str, base: f64) -> String {
+    pub fn toml(&self, name: &str, base: f64) -> String {
         let Self { begin: [x, y], size: [a, b], cells: [m, n], height, layers, element, young } = self;
         format!(
             "[material.{name}]\nyoung = {young:?}\npoisson = 0.3\n[body.{name}]\nmaterial = \"{name}\"\nelement = \"{element}\"\n\
              brick = {{ origin = [{x:?}, {y:?}, {base:?}], size = [{a:?}, {b:?}, {height:?}], cells = [{m}, {n}, {layers}] }}\n"
         )
     }
+
+    /// Its widest cell, along the surfaces.
+    pub fn widest(&self) -> f64 {
+        (0..2).map(|a| self.size[a] / self.cells[a] as f64).fold(0.0, f64::max)
+    }
+}
+
+/// Where a block is above another one, along an axis.
+pub fn overlap(lower: &Block, upper: &Block, a: usize) -> [f64; 2] {
+    let [lower, upper] = [lower, upper].map(|block| [block.begin[a], block.begin[a] + block.size[a]]);
+    [lower[0].max(upper[0]), lower[1].min(upper[1])]
 }
 
 /// An upper block on a lower one, pressed with one on its top, where it is guided along z.
@@ -69,7 +80,7 @@ struct Stacked {
 
 /// What a scene came to.
 #[derive(Debug)]
-enum End {
+pub enum End {
     Converged(Box<Summary>),
     Tips,
 }
@@ -84,17 +95,16 @@ impl Stacked {
     /// Distance from the load's resultant to the nearest edge of the overlap, negative outside.
     fn margin(&self) -> f64 {
         let along = |a: usize| {
-            let [lower, upper] = [self.lower, self.upper].map(|block| [block.begin[a], block.begin[a] + block.size[a]]);
-            let at = 0.5 * (upper[0] + upper[1]);
-            (at - lower[0].max(upper[0])).min(lower[1].min(upper[1]) - at)
+            let [low, high] = overlap(&self.lower, &self.upper, a);
+            let at = self.upper.begin[a] + 0.5 * self.upper.size[a];
+            (at - low).min(high - at)
         };
         along(0).min(along(1))
     }
 
     /// Whether the load's resultant is beyond the overlap, or nearer to its edge than multipliers are that have no node in reach.
     fn may_tip(&self) -> bool {
-        let widest = |block: &Block| (0..2).map(|a| block.size[a] / block.cells[a] as f64).fold(0.0, f64::max);
-        self.margin() < 0.25 * widest(&self.lower).max(widest(&self.upper))
+        self.margin() < 0.25 * self.lower.widest().max(self.upper.widest())
     }
 
     /// Reflected at the plane x = 0.
@@ -115,39 +125,49 @@ impl Stacked {
             self.lower.toml("lower", 0.0),
             self.upper.toml("upper", self.lower.height + self.gap),
         );
-        let scene = Scene::from_text(&text, "random", 1, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
-        let solved = model::discretise(&scene, &Solo).map_err(StudyError::from).and_then(|discrete| {
-            study::solve(&scene, &discrete, &Solo, study::Begin::Rest, &Timer::default(), &mut ())
-        });
-        match solved {
-            Ok(solved) => {
-                assert_eq!(solved.summary.converged, Some(true), "{self:?} {sides}: {:?}", solved.summary.error);
-                End::Converged(Box::new(solved.summary))
-            }
-            Err(StudyError::Model(ModelError::Unheld(_))) => End::Tips,
-            Err(error) => panic!("{error}\n{text}"),
-        }
+        solve_text(&text, &format!("{self:?} {sides}"))
     }
 }
 
+/// What a scene comes to, told as `what`.
+pub fn solve_text(text: &str, what: &str) -> End {
+    let scene = Scene::from_text(text, "random", 1, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let solved = model::discretise(&scene, &Solo)
+        .map_err(StudyError::from)
+        .and_then(|discrete| study::solve(&scene, &discrete, &Solo, study::Begin::Rest, &Timer::default(), &mut ()));
+    match solved {
+        Ok(solved) => {
+            assert_eq!(solved.summary.converged, Some(true), "{what}: {:?}\n{text}", solved.summary.error);
+            End::Converged(Box::new(solved.summary))
+        }
+        Err(StudyError::Model(ModelError::Unheld(_))) => End::Tips,
+        Err(error) => panic!("{error}\n{text}"),
+    }
+}
+
+/// How many random scenes are wanted, if that is stated.
+pub fn stated() -> Option<u64> {
+    std::env::var("FETIPLAST_FUZZ_SCENES").ok().map(|n| n.parse().expect("it is a number of scenes"))
+}
+
 /// Difference of two energies, relative to what is stored.
-fn difference(one: &Summary, other: &Summary) -> f64 {
+pub fn difference(one: &Summary, other: &Summary) -> f64 {
     let energy = |summary: &Summary| summary.state.energy.expect("it is solved");
     let stored = |summary: &Summary| summary.state.internal_energy.expect("it is solved");
     (energy(one) - energy(other)).abs() / stored(one).max(stored(other))
 }
 
 /// What a scene says of the error of its energy: twice the square of that of its stress, where singular edges hide half of it.
-fn own_error(summary: &Summary) -> f64 {
+pub fn own_error(summary: &Summary) -> f64 {
     2.0 * summary.state.errors.discretisation.expect("it is solved").powi(2)
 }
 
-const LOWER_SLAVE: &str = "slave = \"lower.zmax\"\nmaster = \"upper.zmin\"";
-const UPPER_SLAVE: &str = "slave = \"upper.zmin\"\nmaster = \"lower.zmax\"";
+pub const LOWER_SLAVE: &str = "slave = \"lower.zmax\"\nmaster = \"upper.zmin\"";
+pub const UPPER_SLAVE: &str = "slave = \"upper.zmin\"\nmaster = \"lower.zmax\"";
 
 #[test]
 fn random_scenes_are_what_their_twins_are() {
-    let stated = std::env::var("FETIPLAST_FUZZ_SCENES").ok().map(|n| n.parse().expect("it is a number of scenes"));
+    let stated = stated();
     let mut random = Random(stated.map_or(1, |n: u64| n));
     let (mut stood, mut tipped, mut largest) = (0, 0, 0.0_f64);
     for number in 0..stated.unwrap_or(FEW as u64) {

@@ -34,8 +34,8 @@ fn smooth_solutions_have_the_orders_of_their_elements() {
 /// Between bodies and with obstacles, where all slips and where some sticks.
 #[test]
 fn friction_is_that_of_closed_forms() {
-    let cases = ["bar-back", "dragged", "incline", "wedge", "press-fit", "plate"]
-        .map(|name| format!("friction-{name}"));
+    let cases =
+        ["bar-back", "dragged", "incline", "wedge", "press-fit", "plate"].map(|name| format!("friction-{name}"));
     let run = verify(2, &cases.each_ref().map(String::as_str));
     assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
     assert!(run.summary()["cases"].as_array().unwrap().len() >= 2 * cases.len());
