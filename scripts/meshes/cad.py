@@ -33,9 +33,9 @@ def flat(axis, place, of=None):
     return lambda volume, low, high: (of is None or volume == of) and near(low[axis]) and near(high[axis])
 
 
-def write(size, path, largest, factors=None):
+def write(size, path, largest, factors=None, order=1):
     """Meshes with elements as wide as a formula in x, y and z says, and writes the file. Factors make those of a volume, by
-    its number, larger, so that it does not match its neighbours."""
+    its number, larger, so that it does not match its neighbours. Elements of order 2 follow curved surfaces."""
     field = gmsh.model.mesh.field
     parts = []
     for _, volume in gmsh.model.getEntities(3):
@@ -52,6 +52,7 @@ def write(size, path, largest, factors=None):
     gmsh.option.setNumber("Mesh.MeshSizeMax", largest)
     gmsh.option.setNumber("Mesh.Algorithm3D", 10)
     gmsh.model.mesh.generate(3)
+    gmsh.model.mesh.setOrder(order)
     gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
     gmsh.option.setNumber("Mesh.Binary", 1)
     gmsh.write(str(path))
