@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::common::fields::{Fields, state_at};
 use crate::common::{
-    assert_close, assert_near, distance, number, reference, run_briefly, run_misused, scene_file, solve, solve_tightly,
-    vector,
+    assert_close, assert_near, assert_scene_refused, distance, number, reference, run_briefly, run_misused, scene_file,
+    solve, solve_tightly, vector,
 };
 use serde_json::Value;
 
@@ -306,6 +306,34 @@ fn contradictory_friction_is_refused() {
         let run = run_misused(2, &arguments);
         assert_eq!(run.code, 65, "{}", run.stderr);
         assert!(run.stderr.contains(message), "{}", run.stderr);
+    }
+}
+
+/// A block of 50 x 50 that only contact holds, pressed with 50 and pushed with 5 on its top, bears limits of friction above 5.
+#[test]
+fn what_a_limit_of_friction_cannot_hold_is_refused() {
+    let text = r#"
+        material.steel = { young = 210000.0, poisson = 0.3 }
+        decomposition.subdomains = 4
+        support.bottom = { surface = "low.zmin", fix = ["x", "y", "z"] }
+        load.press = { surface = "high.zmax", traction = [5.0, 0.0, -50.0] }
+        contact.joint = { slave = "high.zmin", master = "low.zmax", shear_limit = 5.1 }
+        [body.low]
+        material = "steel"
+        element = "hex8"
+        brick = { origin = [0.0, 0.0, 0.0], size = [100.0, 100.0, 40.0], cells = [8, 8, 3] }
+        [body.high]
+        material = "steel"
+        element = "hex8"
+        brick = { origin = [25.0, 25.0, 40.0], size = [50.0, 50.0, 20.0], cells = [4, 4, 2] }
+        "#;
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), text);
+    let summary = solve(2, &scene, &[]).converged().summary();
+    assert_near("contact force", vector(&summary["contact_force"]), [-12_500.0, 0.0, 125_000.0], 1e-6);
+    for limit in ["4.99", "3"] {
+        let more = [&format!("contact.joint.shear_limit={limit}")[..]];
+        assert_scene_refused(&scene, &more, 65, &["body.high: loads drive its translation along +x"]);
     }
 }
 

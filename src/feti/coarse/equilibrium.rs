@@ -12,7 +12,7 @@
 
 use super::Coarse;
 use super::bodies::{BodyMotions, Motion};
-use super::cones::{Cones, unit};
+use super::cones::{Balance, Cones, unit};
 use crate::constraint::Constraints;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
@@ -38,9 +38,6 @@ pub struct Unheld {
 
 /// Forces smaller than this share of all are nothing.
 const NOTHING: f64 = 1e-9;
-
-/// Generators are added to cones so many times at most.
-const CUTS: usize = 60;
 
 /// Whether all bodies are held at the end of each stage, where loads have the resultants `R'f` (six numbers a cluster,
 /// collective), which are asked for only if supports leave some body free. Collective.
@@ -75,19 +72,11 @@ pub fn check(
         let (force, all) = on_bodies(motions, &resultants);
         let load = along(&force);
         let cones = Cones::new(coarse, space, constraints, (&friction(stage), free.len()), along);
-        let mut pushes = [&normals[..], &cones.sides].concat();
-        let mut left = nnls::solve(&pushes, &load).residual;
-        for _ in 0..CUTS {
-            let more = if length(&left) > NOTHING * all { cones.against(&left) } else { Vec::new() };
-            if more.is_empty() {
-                break;
-            }
-            pushes.extend(more);
-            left = nnls::solve(&pushes, &load).residual;
-        }
+        let Balance { mut pushes, left } = cones.balance(&normals, &load, NOTHING * all);
         if length(&left) > NOTHING * all {
             return unheld(&left, stage, true);
         }
+        pushes.extend(cones.along_discs());
         // The load keeps bodies where they are as a push the other way would.
         let mut all_pushes = pushes.clone();
         if length(&load) > NOTHING * all {
