@@ -76,7 +76,7 @@ impl Case for Block {
     }
 
     fn levels(&self, element: Kind) -> Vec<usize> {
-        if element == Kind::Tet10 { Vec::new() } else { vec![1, 2] }
+        if element == Kind::Tet10 { vec![1] } else { vec![1, 2] }
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {
