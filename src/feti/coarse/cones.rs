@@ -1,16 +1,17 @@
 //! What contacts with friction can exert on rigid motions of whole bodies.
 //!
-//! With Coulomb's friction that is a cone of forces for each contact, with Tresca's a disc. A sum of discs is a convex set, whose points are
+//! With Coulomb's friction that is a cone of forces for each pair, with Tresca's a disc. The discs of a contact add up to a convex set,
+//! whose points are
 //!
 //! ```text
 //! sum_j x_j t_j   with   x_j >= 0,  sum_j x_j <= 1
 //! ```
 //!
 //! for sums `t_j` of border points. The second condition is one row more, with a slack. As many generators are taken as it takes: a motion
-//! that is left over adds to each cone the force that resists it most, and of the discs the sum that does, until there is none. So what is
-//! refused cannot be held.
+//! that is left over adds to each cone the force that resists it most, and of each sum of discs the point that does, until there is none.
+//! So what is refused cannot be held. What is not decided after many of them counts as held, and solving tells.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::Coarse;
 use crate::constraint::Constraints;
@@ -25,15 +26,15 @@ use crate::vector::{dot, length};
 pub(super) struct Cones {
     /// Of each: along the normal, and along the surface as far as friction goes, for a unit force.
     axes: Vec<[Vec<f64>; 3]>,
-    /// Of each: along the surface, as far as friction goes.
-    discs: Vec<[Vec<f64>; 2]>,
+    /// Of each contact those of its pairs: along the surface, as far as friction goes.
+    discs: Vec<Vec<[Vec<f64>; 2]>>,
 }
 
 /// How contacts balance a load.
 pub(super) struct Balance {
     /// Forces without a limit that were tried: pushes, and those in cones.
     pub pushes: Vec<Vec<f64>>,
-    /// What is left of the load, a motion that it drives.
+    /// What is left of the load, a motion that it drives; zero where that is not proven.
     pub left: Vec<f64>,
 }
 
@@ -59,27 +60,27 @@ impl Cones {
         let width = 3 * motions;
         let cone = |row: usize| {
             let slider = of_row.get(&row)?;
-            let (factor, is_given) = match friction[slider.contact]? {
-                Friction::Coulomb(coefficient) => (coefficient, 0.0),
-                Friction::Tresca(limit) => (limit * slider.share, 1.0),
+            let (factor, group) = match friction[slider.contact]? {
+                Friction::Coulomb(coefficient) => (coefficient, -1.0),
+                Friction::Tresca(limit) => (limit * slider.share, slider.contact as f64),
             };
             let mut numbers = unit_force(row, 1.0);
             for k in 0..2 {
                 let tangent = slider.tangents.get(k);
                 numbers.extend(tangent.map_or(vec![0.0; motions], |tangent| unit_force(tangent.row, factor)));
             }
-            numbers.push(is_given);
+            numbers.push(group);
             Some(numbers)
         };
-        let mut found = Self::default();
+        let (mut axes, mut discs) = (Vec::new(), BTreeMap::<usize, Vec<_>>::new());
         for numbers in space.gather(width + 1, cone) {
             let [normal, first, second] = [0, 1, 2].map(|k| numbers[k * motions..][..motions].to_vec());
-            match numbers[width] == 1.0 {
-                true => found.discs.push([first, second]),
-                false => found.axes.push([normal, first, second]),
+            match numbers[width] < 0.0 {
+                true => axes.push([normal, first, second]),
+                false => discs.entry(numbers[width] as usize).or_default().push([first, second]),
             }
         }
-        found
+        Self { axes, discs: discs.into_values().collect() }
     }
 
     /// Forces that are there in any case: four sides of each cone, so that it has all its dimensions.
@@ -93,39 +94,37 @@ impl Cones {
     /// Forces both ways along the surfaces that have a limit.
     pub fn along_discs(&self) -> impl Iterator<Item = Vec<f64>> {
         let both_ways = |x: &Vec<f64>| [x.clone(), x.iter().map(|x| -x).collect()];
-        self.discs.iter().flatten().filter(|x| length(x) > 0.0).flat_map(both_ways).map(unit)
+        self.discs.iter().flatten().flatten().filter(|x| length(x) > 0.0).flat_map(both_ways).map(unit)
     }
 
     /// Balances a load by pushes along `normals` and by friction; what is left is nothing below `nothing`.
     pub fn balance(&self, normals: &[Vec<f64>], load: &[f64], nothing: f64) -> Balance {
         let (motions, weight) = (load.len(), length(load));
-        let limited = usize::from(!self.discs.is_empty());
-        let row = |force: &[f64], share: f64| -> Vec<f64> { [force, &[share * weight][..limited]].concat() };
-        let target = row(load, 1.0);
+        let row = |force: &[f64], shares: &dyn Fn(usize) -> bool| -> Vec<f64> {
+            let shares = (0..self.discs.len()).map(|group| if shares(group) { weight } else { 0.0 });
+            force.iter().copied().chain(shares).collect()
+        };
+        let (target, none) = (row(load, &|_| true), vec![0.0; motions]);
         let mut pushes: Vec<Vec<f64>> = normals.iter().cloned().chain(self.sides()).collect();
-        let mut columns: Vec<Vec<f64>> = pushes.iter().map(|push| row(push, 0.0)).collect();
-        columns.extend((limited > 0).then(|| unit(row(&vec![0.0; motions], 1.0))));
-        let mut left = nnls::solve(&columns, &target).residual;
+        let mut columns: Vec<Vec<f64>> = pushes.iter().map(|push| row(push, &|_| false)).collect();
+        columns.extend((0..self.discs.len()).map(|group| unit(row(&none, &|of| of == group))));
         for _ in 0..CUTS {
+            let mut left = nnls::solve(&columns, &target).residual;
             if length(&left) <= nothing {
                 break;
             }
-            let known = columns.len();
             let motion = &left[..motions];
             let more = self.against(motion);
-            columns.extend(more.iter().map(|push| row(push, 0.0)));
+            let most = (0..self.discs.len()).map(|group| unit(row(&self.most(group, motion), &|of| of == group)));
+            let most: Vec<Vec<f64>> = most.filter(|most| dot(most, &left) > RESISTS * length(&left)).collect();
+            if more.is_empty() && most.is_empty() {
+                left.truncate(motions);
+                return Balance { pushes, left };
+            }
+            columns.extend(more.iter().map(|push| row(push, &|_| false)).chain(most));
             pushes.extend(more);
-            if limited > 0 {
-                let most = unit(row(&self.most(motion), 1.0));
-                columns.extend((dot(&most, &left) > RESISTS * length(&left)).then_some(most));
-            }
-            if columns.len() == known {
-                break;
-            }
-            left = nnls::solve(&columns, &target).residual;
         }
-        left.truncate(motions);
-        Balance { pushes, left }
+        Balance { pushes, left: none }
     }
 
     /// The force of each cone that resists a motion most, of those that resist it.
@@ -142,10 +141,10 @@ impl Cones {
         self.axes.iter().filter_map(most).collect()
     }
 
-    /// What the discs together resist a motion most with.
-    fn most(&self, motion: &[f64]) -> Vec<f64> {
+    /// What the discs of a contact resist a motion most with.
+    fn most(&self, group: usize, motion: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; motion.len()];
-        for [first, second] in &self.discs {
+        for [first, second] in &self.discs[group] {
             let (a, b) = (dot(first, motion), dot(second, motion));
             let size = a.hypot(b);
             if size > 0.0 {
@@ -157,7 +156,7 @@ impl Cones {
 }
 
 /// Generators are added so many times at most.
-const CUTS: usize = 60;
+const CUTS: usize = 100;
 
 /// A force resists a motion if it is along it by more than this share.
 const RESISTS: f64 = 1e-8;
@@ -191,8 +190,8 @@ mod tests {
     fn discs_bear_what_is_within_their_sum_and_nothing_beyond() {
         for seed in 0..40 {
             let mut random = Random::new(seed);
-            let discs = (0..7).map(|_| [vector(&mut random), vector(&mut random)]).collect();
-            let cones = Cones { axes: Vec::new(), discs };
+            let mut discs = |count: usize| (0..count).map(|_| [vector(&mut random), vector(&mut random)]).collect();
+            let cones = Cones { axes: Vec::new(), discs: vec![discs(5), discs(1), discs(3)] };
             let motion = unit(vector(&mut random));
             let mut idle = || {
                 let push = vector(&mut random);
@@ -200,7 +199,8 @@ mod tests {
                 push.iter().zip(&motion).map(|(p, m)| p - along * m).collect::<Vec<f64>>()
             };
             let normals = [idle(), idle()];
-            let border = cones.most(&motion);
+            let border = (0..3).map(|group| cones.most(group, &motion));
+            let border = border.fold(vec![0.0; MOTIONS], |sum, most| combined(&sum, (1.0, &most), (0.0, &most)));
             for (share, bears) in [(0.5, true), (0.999, true), (1.001, false), (2.0, false)] {
                 let load: Vec<f64> =
                     (0..MOTIONS).map(|k| share * border[k] + 3.0 * normals[0][k] + normals[1][k]).collect();
