@@ -86,6 +86,8 @@ pub(super) fn carry_out(
 
     let table = PhaseTable::gather(comm, timer);
     describe_run(&mut solved.summary, &plan.source, comm);
+    // Measured once, for memory grows by the messages that tell of it.
+    solved.summary.peak_rss_mb_max = Some(table.memory_mb.max);
     let told = warnings(scene, &discrete.warnings, solved.summary.sizes.subdomains, comm);
     let told = tight.into_iter().chain(told).collect();
     solved.summary.mesh_reading_mb = discrete.reading_mb;

@@ -65,10 +65,9 @@ fn a_result_deleted_under_the_run_is_written_all_the_same() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("out");
     let end = run_disturbed(2, &long(&out, &["--checkpoint-every", "0.2"]), |_| {
-        // While it is at work, not before and not behind: runs get faster.
-        let started = Instant::now();
-        let is_at_work = || fs::read_dir(&out).is_ok_and(|mut files| files.next().is_some());
-        while !is_at_work() && started.elapsed() < Duration::from_secs(10) {
+        // While it is at work, not while it still tries its files, and not behind: runs get faster.
+        let (started, checkpoint) = (Instant::now(), out.join("two-blocks.checkpoint.h5"));
+        while !checkpoint.exists() && started.elapsed() < Duration::from_secs(10) {
             sleep(Duration::from_millis(5));
         }
         let _ = fs::remove_dir_all(&out);
