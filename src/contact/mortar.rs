@@ -27,7 +27,7 @@ use super::dual::{self, DualFunctions};
 use super::opposite::{Face, INSIDE, IntegrationPoint, Opposite, Seen, faces, functions, line};
 use super::patch::Line;
 use super::surface::{GatheredSurface, Layer};
-use super::{Conditions, ContactError, ContactPair, MasterNode, edge};
+use super::{Conditions, ContactError, ContactPair, MasterNode, edge, quadratic};
 use crate::mesh::surface;
 use crate::vector::{difference, dot};
 
@@ -80,6 +80,7 @@ pub fn conditions(
     held: &[[bool; 3]],
 ) -> (Conditions, bool) {
     let normals = slave.normals_and_areas();
+    let of_corners = (!slave.quadratic.is_empty()).then(|| quadratic::areas_of_corners(slave));
     let parts = parts(slave, master, &normals);
     let reach = reach(&parts, slave.nodes.len());
     let is_held = |node: usize| is_held(normals[node].0, held[node]);
@@ -106,7 +107,7 @@ pub fn conditions(
             masters: masters.into_iter().map(|(l, sum)| (l, sum / whole)).collect(),
             normal,
             area,
-            share: normals[node].1,
+            share: of_corners.as_ref().map_or(normals[node].1, |areas| areas[node]),
             covered: reach[node] >= AT_THE_EDGE,
         }
     };

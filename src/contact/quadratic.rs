@@ -34,6 +34,16 @@ pub(super) fn areas(surface: &GatheredSurface, counts: impl Fn(&[usize; 6]) -> b
     areas
 }
 
+/// Area that belongs to the condition of each corner where middles have none: the integral of its linear function.
+pub(super) fn areas_of_corners(surface: &GatheredSurface) -> Vec<f64> {
+    let mut areas = vec![0.0; surface.nodes.len()];
+    let of_triangles: Vec<f64> = surface.corners().map(|corners| crate::mesh::surface::area(&corners)).collect();
+    for (face, parts) in surface.quadratic.iter().zip(of_triangles.chunks_exact(4)) {
+        face[..3].iter().for_each(|&corner| areas[corner] += parts.iter().sum::<f64>() / 3.0);
+    }
+    areas
+}
+
 /// From conditions on nodes to those on coefficients. `gap` is the distance, along a direction, of a pair. Middles of which a
 /// corner has no condition have none either.
 pub fn conditions(

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::common::fields::{Fields, state_at};
 use crate::common::{
-    assert_close, assert_near, assert_scene_refused, distance, number, reference, run_briefly, run_misused, scene_file,
-    solve, solve_tightly, vector,
+    assert_close, assert_near, assert_scene_refused, check, distance, number, reference, run_briefly, run_misused,
+    scene_file, solve, solve_tightly, vector,
 };
 use serde_json::Value;
 
@@ -331,10 +331,48 @@ fn what_a_limit_of_friction_cannot_hold_is_refused() {
     let scene = scene_file(directory.path(), text);
     let summary = solve(2, &scene, &[]).converged().summary();
     assert_near("contact force", vector(&summary["contact_force"]), [-12_500.0, 0.0, 125_000.0], 1e-6);
-    for limit in ["4.99", "3"] {
-        let more = [&format!("contact.joint.shear_limit={limit}")[..]];
-        assert_scene_refused(&scene, &more, 65, &["body.high: loads drive its translation along +x"]);
+    // Its area is that of all conditions, whatever the elements, and where meshes do not match.
+    let quadratic = ["body.high.element=tet10", "body.low.element=tet10"];
+    let other = ["body.high.brick.cells=[3, 3, 2]"];
+    for sets in [&[][..], &quadratic, &other, &[&quadratic[..], &other].concat()] {
+        for limit in [5.1, 4.99] {
+            let limit_set = format!("contact.joint.shear_limit={limit}");
+            let run = check(1, &scene, 1, &[sets, &[&limit_set[..]]].concat());
+            assert_eq!(run.code, if limit > 5.0 { 0 } else { 65 }, "{sets:?}, {limit}: {}", run.stderr);
+        }
     }
+    assert_scene_refused(
+        &scene,
+        &["contact.joint.shear_limit=3"],
+        65,
+        &["body.high: loads drive its translation along +x"],
+    );
+}
+
+/// Pushed by 0.4 % less than what friction bears, on a mesh with few conditions.
+#[test]
+fn what_friction_just_holds_is_not_refused() {
+    let block = |name: &str, origin: [f64; 3], size: [f64; 3], cells: [usize; 3], element: &str| {
+        format!(
+            "[body.{name}]\nmaterial = \"steel\"\nelement = \"{element}\"\n\
+             brick = {{ origin = {origin:?}, size = {size:?}, cells = {cells:?} }}\n"
+        )
+    };
+    let text = format!(
+        "material.steel = {{ young = 1000.0, poisson = 0.3 }}
+        decomposition.subdomains = 2
+        support.ground = {{ surface = \"lower.zmin\", fix = [\"x\", \"y\", \"z\"] }}
+        load.press = {{ surface = \"upper.zmax\", traction = [-0.0004, 0.0996, -1.0] }}
+        contact.joint = {{ slave = \"upper.zmin\", master = \"lower.zmax\", friction = 0.1 }}
+        {}{}",
+        block("lower", [0.0; 3], [1.262, 1.07, 1.101], [4, 5, 3], "tet10"),
+        block("upper", [0.4248408, -0.4706952, 1.101], [0.923, 1.937, 0.5786], [4, 3, 2], "tet4"),
+    );
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), &text);
+    assert_eq!(check(1, &scene, 1, &[]).code, 0);
+    let beyond = ["load.press.traction=[-0.0004, 0.1004, -1.0]"];
+    assert_scene_refused(&scene, &beyond, 65, &["body.upper: loads drive"]);
 }
 
 /// Applications of F beside those without friction, which depend on no machine; strong friction on parts of any shape, too.

@@ -128,7 +128,7 @@ impl Cones {
     }
 
     /// The force of each cone that resists a motion most, of those that resist it.
-    fn against(&self, motion: &[f64]) -> Vec<Vec<f64>> {
+    pub fn against(&self, motion: &[f64]) -> Vec<Vec<f64>> {
         let most = |[normal, first, second]: &[Vec<f64>; 3]| {
             let (a, b) = (dot(first, motion), dot(second, motion));
             let size = a.hypot(b);
@@ -156,7 +156,7 @@ impl Cones {
 }
 
 /// Generators are added so many times at most.
-const CUTS: usize = 100;
+pub(super) const CUTS: usize = 100;
 
 /// A force resists a motion if it is along it by more than this share.
 const RESISTS: f64 = 1e-8;

@@ -12,7 +12,7 @@
 
 use super::Coarse;
 use super::bodies::{BodyMotions, Motion};
-use super::cones::{Balance, Cones, unit};
+use super::cones::{Balance, CUTS, Cones, unit};
 use crate::constraint::Constraints;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
@@ -78,25 +78,34 @@ pub fn check(
         }
         pushes.extend(cones.along_discs());
         // The load keeps bodies where they are as a push the other way would.
-        let mut all_pushes = pushes.clone();
-        if length(&load) > NOTHING * all {
-            all_pushes.push(unit(load.iter().map(|f| -f).collect()));
-        }
-        if let Some(motion) = complement(&all_pushes, free.len()).first() {
-            return unheld(motion, stage, false);
-        }
-        let mut opposite = vec![0.0; free.len()];
-        all_pushes.iter().for_each(|push| opposite.iter_mut().zip(push).for_each(|(o, p)| *o -= p));
-        let mut spread = nnls::solve(&all_pushes, &opposite);
-        // A load that has to be this large holds by rounding only.
-        if spread.x.iter().any(|x| *x * NOTHING > length(&opposite)) {
-            spread = nnls::solve(&pushes, &opposite);
-        }
-        if length(&spread.residual) > NOTHING * length(&opposite) {
-            return unheld(&spread.residual, stage, false);
+        let kept = (length(&load) > NOTHING * all).then(|| unit(load.iter().map(|f| -f).collect()));
+        for _ in 0..CUTS {
+            let Some(motion) = nothing_resists(&pushes, kept.as_ref(), free.len()) else { break };
+            // Of cones only those generators are known that bear the load.
+            let more = cones.against(&motion);
+            if more.is_empty() {
+                return unheld(&motion, stage, false);
+            }
+            pushes.extend(more);
         }
     }
     Ok(())
+}
+
+/// A motion that is free in one direction, where pushes and what the load keeps cannot make up any force.
+fn nothing_resists(pushes: &[Vec<f64>], kept: Option<&Vec<f64>>, motions: usize) -> Option<Vec<f64>> {
+    let all_pushes: Vec<Vec<f64>> = pushes.iter().chain(kept).cloned().collect();
+    if let Some(motion) = complement(&all_pushes, motions).first() {
+        return Some(motion.clone());
+    }
+    let mut opposite = vec![0.0; motions];
+    all_pushes.iter().for_each(|push| opposite.iter_mut().zip(push).for_each(|(o, p)| *o -= p));
+    let mut spread = nnls::solve(&all_pushes, &opposite);
+    // A load that has to be this large holds by rounding only.
+    if spread.x.iter().any(|x| *x * NOTHING > length(&opposite)) {
+        spread = nnls::solve(pushes, &opposite);
+    }
+    (length(&spread.residual) > NOTHING * length(&opposite)).then_some(spread.residual)
 }
 
 /// Forces and moments on all bodies from those on clusters, and the sum of their sizes.
