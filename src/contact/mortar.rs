@@ -80,7 +80,10 @@ pub fn conditions(
     held: &[[bool; 3]],
 ) -> (Conditions, bool) {
     let normals = slave.normals_and_areas();
-    let of_corners = (!slave.quadratic.is_empty()).then(|| quadratic::areas_of_corners(slave));
+    let shares = match slave.quadratic.is_empty() {
+        true => normals.iter().map(|(_, area)| *area).collect(),
+        false => quadratic::areas_of_corners(slave),
+    };
     let parts = parts(slave, master, &normals);
     let reach = reach(&parts, slave.nodes.len());
     let is_held = |node: usize| is_held(normals[node].0, held[node]);
@@ -107,7 +110,7 @@ pub fn conditions(
             masters: masters.into_iter().map(|(l, sum)| (l, sum / whole)).collect(),
             normal,
             area,
-            share: of_corners.as_ref().map_or(normals[node].1, |areas| areas[node]),
+            share: shares[node],
             covered: reach[node] >= AT_THE_EDGE,
         }
     };

@@ -10,7 +10,9 @@ use crate::analytic::mindlin::Line;
 use crate::element::Kind;
 use crate::material::VonMises;
 
-const STEEL: VonMises = VonMises::elastic(210_000.0, 0.3);
+pub(super) const STEEL: VonMises = VonMises::elastic(210_000.0, 0.3);
+/// A half space that gives way as both bodies do together.
+pub(super) const BOTH: VonMises = VonMises::elastic(0.5 * STEEL.young, STEEL.poisson);
 pub(super) const RADIUS: f64 = 50.0;
 pub(super) const FRICTION: f64 = 0.3;
 /// Makes half a width of contact of about 0.8, and friction of about half of what would make all of it slip.
@@ -87,8 +89,7 @@ impl Case for Cylinder {
 
     fn errors(&self, run: &Run) -> Vec<Error> {
         let [x, _, z] = run.summary().state.contact_force.unwrap_or_default();
-        // Both together give way twice as far as one.
-        let modulus = 0.5 * STEEL.young / (1.0 - STEEL.poisson * STEEL.poisson);
+        let modulus = BOTH.young / (1.0 - BOTH.poisson * BOTH.poisson);
         let exact = Line::new(modulus, RADIUS, FRICTION, [z, x].map(|force| force.abs() / SLICE));
         let touches = run.contacts();
         // About the middle of what presses.

@@ -4,17 +4,13 @@
 //! move each other's surfaces along. Their size makes them come a few per cent less near along the normal, which is no part of this, and
 //! little along the push. Stresses across the push, which the closed form leaves out, make a percent of the radius.
 
-use super::mindlin::{FRICTION, RADIUS, mirrored, planes};
+use super::mindlin::{BOTH, FRICTION, RADIUS, STEEL, mirrored, planes};
 use super::run::Run;
 use super::{Case, Demand, Error, material_line};
 use crate::analytic::hertz::Hertz;
 use crate::analytic::mindlin;
 use crate::element::Kind;
-use crate::material::VonMises;
 
-const STEEL: VonMises = VonMises::elastic(210_000.0, 0.3);
-/// A half space that gives way as both do together.
-const BOTH: VonMises = VonMises::elastic(0.5 * STEEL.young, STEEL.poisson);
 /// Makes a circle of contact of radius 0.7, and friction of about half of what would make all of it slip.
 const APPROACH: f64 = 0.0095;
 const PUSHED: f64 = 0.00127;

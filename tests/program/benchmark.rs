@@ -1,13 +1,23 @@
 //! The paper's benchmark: sizes of its Table 2, and solutions against those of an independent monolithic solver.
 
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+
 use crate::common::fields::Fields;
 use crate::common::{
-    Run, assert_close, assert_near, assert_residuals, check, number, reference, solve, solve_level, vector,
+    Run, assert_close, assert_near, assert_residuals, check, distance, number, solve, solve_level, solve_tightly,
+    vector,
 };
 use serde_json::Value;
 
 /// Hessian multiplications that the paper reports at level 1.
 const PAPER_MULTIPLICATIONS: f64 = 1951.0;
+
+fn reference(name: &str) -> Value {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/reference/{name}.json"));
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
 
 /// Everything that the reference has, to 1e-6, and the counts exactly.
 fn assert_agrees(run: &Run, name: &str) {
@@ -109,4 +119,52 @@ fn level_2_agrees_with_the_monolithic_solver() {
         "solver.preconditioner=dirichlet",
     ];
     assert_agrees(&solve_level(2, "two-blocks", 2, &sets).converged(), "level2");
+}
+
+/// With friction, node by node, too.
+#[test]
+fn level_1_with_friction_agrees_with_the_monolithic_solver() {
+    let reference = reference("level1-friction");
+    let cases = reference["cases"].as_array().unwrap();
+    let of_nodes = |case: &Value| -> Vec<[f64; 5]> {
+        let node = |node: &Value| std::array::from_fn(|k| node[k].as_f64().unwrap());
+        case["nodes"].as_array().unwrap().iter().map(node).collect()
+    };
+    // Where all slips at a given limit, forces are that times the area of the node.
+    let limit = number(&reference, "shear_limit");
+    let given =
+        of_nodes(&cases[2]).into_iter().map(|[x, y, fx, fy, _]| ([x, y].map(f64::to_bits), fx.hypot(fy) / limit));
+    let area: BTreeMap<[u64; 2], f64> = given.collect();
+    for case in cases {
+        let sets: Vec<&str> = case["sets"].as_array().unwrap().iter().map(|set| set.as_str().unwrap()).collect();
+        let run = solve_tightly(2, "two-blocks", &sets);
+        let summary = run.summary();
+        let rubbed = &summary["friction"]["joint"];
+        for key in ["energy", "external_work", "max_displacement", "max_von_mises"] {
+            assert_close(key, number(&summary, key), number(case, key), 1e-9);
+        }
+        assert_near("contact force", vector(&summary["contact_force"]), vector(&case["contact_force"]), 1e-9);
+        let dissipation = number(rubbed, "dissipation");
+        assert_close("dissipation", dissipation, number(case, "dissipation"), 1e-9);
+        assert_eq!(summary["plastic_elements"], case["plastic_elements"]);
+        let nodes = of_nodes(case);
+        let found = ["sticking", "slipping"].map(|key| rubbed[key].as_u64().unwrap());
+        assert_eq!(found, [0, nodes.len() as u64], "{sets:?}");
+
+        let fields = Fields::read(&run.result());
+        let (bodies, pressure) = (fields.body_of_points(), fields.of_points("contact_pressure"));
+        let traction = fields.of_points("friction_traction");
+        let largest = nodes.iter().flat_map(|node| &node[2..]).fold(0.0, |most, force| force.abs().max(most));
+        for [x, y, force @ ..] in nodes {
+            let is_upper = |k: &usize| bodies[*k] == 1 && fields.points[*k] == [x, y, 1000.0];
+            let copies: Vec<usize> = (0..bodies.len()).filter(is_upper).collect();
+            assert!(!copies.is_empty(), "no node at {x}, {y}");
+            for copy in copies {
+                let [tx, ty, _] = traction.as_chunks::<3>().0[copy];
+                let found = [tx, ty, pressure[copy]].map(|stress| stress * area[&[x, y].map(f64::to_bits)]);
+                let off = distance(found, force) / largest;
+                assert!(off < 1e-9, "{sets:?} at {x}, {y}: {found:?}, not {force:?}");
+            }
+        }
+    }
 }

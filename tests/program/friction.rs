@@ -1,11 +1,8 @@
 //! Friction: closed forms, an independent program's numbers, and what must be refused.
 
-use std::collections::BTreeMap;
-
 use crate::common::fields::{Fields, state_at};
 use crate::common::{
-    assert_close, assert_near, assert_scene_refused, check, distance, number, reference, run_briefly, run_misused,
-    scene_file, solve, solve_tightly, vector,
+    assert_close, assert_near, number, run_briefly, run_misused, scene_file, solve, solve_tightly, vector,
 };
 use serde_json::Value;
 
@@ -230,53 +227,6 @@ fn a_pulled_bar_slips_as_far_as_friction_takes_and_keeps_half_of_it() {
     assert_eq!(bits(0), bits(1), "the same bits on any ranks");
 }
 
-/// The benchmark of the paper with friction, against an independent monolithic program: node by node, too.
-#[test]
-fn the_benchmark_with_friction_is_that_of_an_independent_program() {
-    let reference = reference("level1-friction");
-    let cases = reference["cases"].as_array().unwrap();
-    let of_nodes = |case: &Value| -> Vec<[f64; 5]> {
-        let node = |node: &Value| std::array::from_fn(|k| node[k].as_f64().unwrap());
-        case["nodes"].as_array().unwrap().iter().map(node).collect()
-    };
-    // Where all slips at a given limit, forces are that times the area of the node.
-    let limit = number(&reference, "shear_limit");
-    let given =
-        of_nodes(&cases[2]).into_iter().map(|[x, y, fx, fy, _]| ([x, y].map(f64::to_bits), fx.hypot(fy) / limit));
-    let area: BTreeMap<[u64; 2], f64> = given.collect();
-    for case in cases {
-        let sets: Vec<&str> = case["sets"].as_array().unwrap().iter().map(|set| set.as_str().unwrap()).collect();
-        let run = solve_tightly(2, "two-blocks", &sets);
-        let summary = run.summary();
-        for key in ["energy", "external_work", "max_displacement", "max_von_mises"] {
-            assert_close(key, number(&summary, key), number(case, key), 1e-9);
-        }
-        assert_near("contact force", vector(&summary["contact_force"]), vector(&case["contact_force"]), 1e-9);
-        let dissipation = rubbed(&summary, "joint", "dissipation").as_f64().unwrap();
-        assert_close("dissipation", dissipation, number(case, "dissipation"), 1e-9);
-        assert_eq!(summary["plastic_elements"], case["plastic_elements"]);
-        let nodes = of_nodes(case);
-        let found = ["sticking", "slipping"].map(|key| rubbed(&summary, "joint", key).as_u64().unwrap());
-        assert_eq!(found, [0, nodes.len() as u64], "{sets:?}");
-
-        let fields = Fields::read(&run.result());
-        let (bodies, pressure) = (fields.body_of_points(), fields.of_points("contact_pressure"));
-        let traction = fields.of_points("friction_traction");
-        let largest = nodes.iter().flat_map(|node| &node[2..]).fold(0.0, |most, force| force.abs().max(most));
-        for [x, y, force @ ..] in nodes {
-            let is_upper = |k: &usize| bodies[*k] == 1 && fields.points[*k] == [x, y, 1000.0];
-            let copies: Vec<usize> = (0..bodies.len()).filter(is_upper).collect();
-            assert!(!copies.is_empty(), "no node at {x}, {y}");
-            for copy in copies {
-                let [tx, ty, _] = traction.as_chunks::<3>().0[copy];
-                let found = [tx, ty, pressure[copy]].map(|stress| stress * area[&[x, y].map(f64::to_bits)]);
-                let off = distance(found, force) / largest;
-                assert!(off < 1e-9, "{sets:?} at {x}, {y}: {found:?}, not {force:?}");
-            }
-        }
-    }
-}
-
 #[test]
 fn friction_costs_little_and_none_costs_nothing() {
     let bits = |sets: &[&str]| {
@@ -307,72 +257,6 @@ fn contradictory_friction_is_refused() {
         assert_eq!(run.code, 65, "{}", run.stderr);
         assert!(run.stderr.contains(message), "{}", run.stderr);
     }
-}
-
-/// A block of 50 x 50 that only contact holds, pressed with 50 and pushed with 5 on its top, bears limits of friction above 5.
-#[test]
-fn what_a_limit_of_friction_cannot_hold_is_refused() {
-    let text = r#"
-        material.steel = { young = 210000.0, poisson = 0.3 }
-        decomposition.subdomains = 4
-        support.bottom = { surface = "low.zmin", fix = ["x", "y", "z"] }
-        load.press = { surface = "high.zmax", traction = [5.0, 0.0, -50.0] }
-        contact.joint = { slave = "high.zmin", master = "low.zmax", shear_limit = 5.1 }
-        [body.low]
-        material = "steel"
-        element = "hex8"
-        brick = { origin = [0.0, 0.0, 0.0], size = [100.0, 100.0, 40.0], cells = [8, 8, 3] }
-        [body.high]
-        material = "steel"
-        element = "hex8"
-        brick = { origin = [25.0, 25.0, 40.0], size = [50.0, 50.0, 20.0], cells = [4, 4, 2] }
-        "#;
-    let directory = tempfile::tempdir().unwrap();
-    let scene = scene_file(directory.path(), text);
-    let summary = solve(2, &scene, &[]).converged().summary();
-    assert_near("contact force", vector(&summary["contact_force"]), [-12_500.0, 0.0, 125_000.0], 1e-6);
-    // Its area is that of all conditions, whatever the elements, and where meshes do not match.
-    let quadratic = ["body.high.element=tet10", "body.low.element=tet10"];
-    let other = ["body.high.brick.cells=[3, 3, 2]"];
-    for sets in [&[][..], &quadratic, &other, &[&quadratic[..], &other].concat()] {
-        for limit in [5.1, 4.99] {
-            let limit_set = format!("contact.joint.shear_limit={limit}");
-            let run = check(1, &scene, 1, &[sets, &[&limit_set[..]]].concat());
-            assert_eq!(run.code, if limit > 5.0 { 0 } else { 65 }, "{sets:?}, {limit}: {}", run.stderr);
-        }
-    }
-    assert_scene_refused(
-        &scene,
-        &["contact.joint.shear_limit=3"],
-        65,
-        &["body.high: loads drive its translation along +x"],
-    );
-}
-
-/// Pushed by 0.4 % less than what friction bears, on a mesh with few conditions.
-#[test]
-fn what_friction_just_holds_is_not_refused() {
-    let block = |name: &str, origin: [f64; 3], size: [f64; 3], cells: [usize; 3], element: &str| {
-        format!(
-            "[body.{name}]\nmaterial = \"steel\"\nelement = \"{element}\"\n\
-             brick = {{ origin = {origin:?}, size = {size:?}, cells = {cells:?} }}\n"
-        )
-    };
-    let text = format!(
-        "material.steel = {{ young = 1000.0, poisson = 0.3 }}
-        decomposition.subdomains = 2
-        support.ground = {{ surface = \"lower.zmin\", fix = [\"x\", \"y\", \"z\"] }}
-        load.press = {{ surface = \"upper.zmax\", traction = [-0.0004, 0.0996, -1.0] }}
-        contact.joint = {{ slave = \"upper.zmin\", master = \"lower.zmax\", friction = 0.1 }}
-        {}{}",
-        block("lower", [0.0; 3], [1.262, 1.07, 1.101], [4, 5, 3], "tet10"),
-        block("upper", [0.4248408, -0.4706952, 1.101], [0.923, 1.937, 0.5786], [4, 3, 2], "tet4"),
-    );
-    let directory = tempfile::tempdir().unwrap();
-    let scene = scene_file(directory.path(), &text);
-    assert_eq!(check(1, &scene, 1, &[]).code, 0);
-    let beyond = ["load.press.traction=[-0.0004, 0.1004, -1.0]"];
-    assert_scene_refused(&scene, &beyond, 65, &["body.upper: loads drive"]);
 }
 
 /// Applications of F beside those without friction, which depend on no machine; strong friction on parts of any shape, too.

@@ -2,9 +2,10 @@
 
 use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
 use crate::common::{
-    self, assert_close, assert_program_refuses, assert_scene_refused, check, number, scene_file, solve, solve_tightly,
-    vector,
+    self, assert_close, assert_near, assert_program_refuses, assert_scene_refused, check, number, scene_file, solve,
+    solve_tightly, vector,
 };
+use crate::twins::{Block, UPPER_SLAVE};
 use serde_json::Value;
 
 const YOUNG: f64 = 210_000.0;
@@ -268,4 +269,86 @@ fn bodies_that_nothing_keeps_in_place_are_refused() {
         + &guides(1)
         + "load.press = { surface = 'b1.zmax', pressure = 100 }\n";
     assert_refused(&scene(1, &steps, ""), &[], &["translation along +z at the end of load step 2 (release)"]);
+}
+
+/// A block of 50 x 50 that only contact holds, pressed with 50 and pushed with 5 on its top, bears limits of friction above 5.
+#[test]
+fn what_a_limit_of_friction_cannot_hold_is_refused() {
+    let low = Block {
+        begin: [0.0; 2],
+        size: [100.0; 2],
+        cells: [8, 8],
+        height: 40.0,
+        layers: 3,
+        element: "hex8",
+        young: 210_000.0,
+    };
+    let high = Block { begin: [25.0; 2], size: [50.0; 2], cells: [4, 4], height: 20.0, layers: 2, ..low };
+    let text = format!(
+        "decomposition.subdomains = 4
+        support.bottom = {{ surface = \"low.zmin\", fix = [\"x\", \"y\", \"z\"] }}
+        load.press = {{ surface = \"high.zmax\", traction = [5.0, 0.0, -50.0] }}
+        contact.joint = {{ slave = \"high.zmin\", master = \"low.zmax\", shear_limit = 5.1 }}
+        {}{}",
+        low.toml("low", 0.0),
+        high.toml("high", low.height),
+    );
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), &text);
+    let summary = solve(2, &scene, &[]).converged().summary();
+    assert_near("contact force", vector(&summary["contact_force"]), [-12_500.0, 0.0, 125_000.0], 1e-6);
+    // Its area is that of all conditions, whatever the elements, and where meshes do not match.
+    let quadratic = ["body.high.element=tet10", "body.low.element=tet10"];
+    let other = ["body.high.brick.cells=[3, 3, 2]"];
+    for sets in [&[][..], &quadratic, &other, &[&quadratic[..], &other].concat()] {
+        for limit in [5.1, 4.99] {
+            let limit_set = format!("contact.joint.shear_limit={limit}");
+            let run = check(1, &scene, 1, &[sets, &[&limit_set[..]]].concat());
+            assert_eq!(run.code, if limit > 5.0 { 0 } else { BAD_SCENE }, "{sets:?}, {limit}: {}", run.stderr);
+        }
+    }
+    assert_scene_refused(
+        &scene,
+        &["contact.joint.shear_limit=3"],
+        BAD_SCENE,
+        &["body.high: loads drive its translation along +x"],
+    );
+}
+
+/// Pushed by 0.4 % less than what friction bears, on a mesh with few conditions.
+#[test]
+fn what_friction_just_holds_is_not_refused() {
+    let lower = Block {
+        begin: [0.0; 2],
+        size: [1.262, 1.07],
+        cells: [4, 5],
+        height: 1.101,
+        layers: 3,
+        element: "tet10",
+        young: 1000.0,
+    };
+    let upper = Block {
+        begin: [0.4248408, -0.4706952],
+        size: [0.923, 1.937],
+        cells: [4, 3],
+        height: 0.5786,
+        layers: 2,
+        element: "tet4",
+        ..lower
+    };
+    let text = format!(
+        "decomposition.subdomains = 2
+        support.ground = {{ surface = \"lower.zmin\", fix = [\"x\", \"y\", \"z\"] }}
+        load.press = {{ surface = \"upper.zmax\", traction = [-0.0004, 0.0996, -1.0] }}
+        contact.joint = {{ {}, friction = 0.1 }}
+        {}{}",
+        UPPER_SLAVE.replace('\n', ", "),
+        lower.toml("lower", 0.0),
+        upper.toml("upper", lower.height),
+    );
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), &text);
+    assert_eq!(check(1, &scene, 1, &[]).code, 0);
+    let beyond = ["load.press.traction=[-0.0004, 0.1004, -1.0]"];
+    assert_scene_refused(&scene, &beyond, BAD_SCENE, &["body.upper: loads drive"]);
 }

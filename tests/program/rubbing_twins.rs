@@ -78,34 +78,37 @@ impl Rubbed {
         [along(0), along(1)].as_flattened().iter().fold(f64::INFINITY, |least, margin| margin.min(least))
     }
 
-    /// How much of what friction can bear the push needs, zero where something else holds: of the most that the law may be taken for,
-    /// and of what it is at least.
-    fn needed(&self) -> [f64; 2] {
-        let Push::Load([x, y]) = self.push else { return [0.0; 2] };
-        let force = x.hypot(y) * self.back.abs().max(1.0);
+    /// What friction bears at least and at most, over the load that presses.
+    fn borne(&self) -> [f64; 2] {
         match self.law {
-            Law::Coulomb(friction) => [force / friction; 2],
+            Law::Coulomb(friction) => [friction; 2],
             Law::Tresca(limit) => {
-                let share = |beyond: f64| {
+                let of = |beyond: f64| {
                     let [a, b] =
                         [0, 1].map(|a| overlap(&self.lower, &self.upper, a)).map(|[low, high]| high - low + beyond);
-                    force * self.upper.size[0] * self.upper.size[1] / (limit * a * b)
+                    limit * a * b / (self.upper.size[0] * self.upper.size[1])
                 };
                 // A slave node near the edge of the other surface has all of its area. Friction that does not act where the load does
                 // has to bear its moment, too, with no more than half of it.
-                [share(2.0 * self.lower.widest().max(self.upper.widest())), 2.0 * share(0.0)]
+                [0.5 * of(0.0), of(2.0 * self.lower.widest().max(self.upper.widest()))]
             }
         }
     }
 
+    /// How much of what friction bears the push needs at least and at most; zero where something else holds.
+    fn needed(&self) -> [f64; 2] {
+        let Push::Load([x, y]) = self.push else { return [0.0; 2] };
+        let [least, most] = self.borne();
+        [most, least].map(|borne| x.hypot(y) * self.back.abs().max(1.0) / borne)
+    }
+
     /// Reflected at the plane x = 0.
     fn mirrored(&self) -> Self {
-        let turn = |block: Block| Block { begin: [-block.begin[0] - block.size[0], block.begin[1]], ..block };
         let push = match self.push {
             Push::Load([x, y]) => Push::Load([-x, y]),
             Push::Way([x, y]) => Push::Way([-x, y]),
         };
-        Self { lower: turn(self.lower), upper: turn(self.upper), push, ..*self }
+        Self { lower: self.lower.mirrored(), upper: self.upper.mirrored(), push, ..*self }
     }
 
     fn solve(&self, sides: &str, subdomains: usize, qp: &str) -> End {
@@ -160,18 +163,7 @@ impl Rubbed {
                 let off = (x.abs() - (factor * along[0]).abs()).hypot(y.abs() - (factor * along[1]).abs());
                 assert!(off < 1e-6, "{what}: {x}, {y} bears {along:?}");
             }
-            let most = match self.law {
-                Law::Coulomb(friction) => friction,
-                // A slave node near the edge of the other surface has all of its area.
-                Law::Tresca(limit) => {
-                    let widest = self.lower.widest().max(self.upper.widest());
-                    let along = |a: usize| {
-                        let [low, high] = overlap(&self.lower, &self.upper, a);
-                        high - low + 2.0 * widest
-                    };
-                    limit * along(0) * along(1) / area
-                }
-            };
+            let [_, most] = self.borne();
             assert!(x.hypot(y) <= most * (1.0 + 1e-6), "{what}: {x}, {y} beyond the limit");
             let of = &state.residuals;
             assert!(of.friction < Some(1e-6) && of.balance < Some(1e-6) && of.energies < Some(1e-6), "{what}: {of:?}");

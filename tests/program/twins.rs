@@ -58,6 +58,11 @@ impl Block {
         )
     }
 
+    /// Reflected at the plane x = 0.
+    pub fn mirrored(self) -> Self {
+        Self { begin: [-self.begin[0] - self.size[0], self.begin[1]], ..self }
+    }
+
     /// Its widest cell, along the surfaces.
     pub fn widest(&self) -> f64 {
         (0..2).map(|a| self.size[a] / self.cells[a] as f64).fold(0.0, f64::max)
@@ -109,8 +114,7 @@ impl Stacked {
 
     /// Reflected at the plane x = 0.
     fn mirrored(&self) -> Self {
-        let turn = |block: Block| Block { begin: [-block.begin[0] - block.size[0], block.begin[1]], ..block };
-        Self { lower: turn(self.lower), upper: turn(self.upper), ..*self }
+        Self { lower: self.lower.mirrored(), upper: self.upper.mirrored(), ..*self }
     }
 
     fn solve(&self, sides: &str, subdomains: usize) -> End {

@@ -100,14 +100,15 @@ impl Cones {
     /// Balances a load by pushes along `normals` and by friction; what is left is nothing below `nothing`.
     pub fn balance(&self, normals: &[Vec<f64>], load: &[f64], nothing: f64) -> Balance {
         let (motions, weight) = (load.len(), length(load));
-        let row = |force: &[f64], shares: &dyn Fn(usize) -> bool| -> Vec<f64> {
-            let shares = (0..self.discs.len()).map(|group| if shares(group) { weight } else { 0.0 });
+        // Behind a force the rows that limit the sum of each contact: of its own one or of none.
+        let row = |force: &[f64], own: Option<usize>| -> Vec<f64> {
+            let shares = (0..self.discs.len()).map(|group| if own == Some(group) { weight } else { 0.0 });
             force.iter().copied().chain(shares).collect()
         };
-        let (target, none) = (row(load, &|_| true), vec![0.0; motions]);
+        let (target, none) = ([load, &vec![weight; self.discs.len()]].concat(), vec![0.0; motions]);
         let mut pushes: Vec<Vec<f64>> = normals.iter().cloned().chain(self.sides()).collect();
-        let mut columns: Vec<Vec<f64>> = pushes.iter().map(|push| row(push, &|_| false)).collect();
-        columns.extend((0..self.discs.len()).map(|group| unit(row(&none, &|of| of == group))));
+        let mut columns: Vec<Vec<f64>> = pushes.iter().map(|push| row(push, None)).collect();
+        columns.extend((0..self.discs.len()).map(|group| unit(row(&none, Some(group)))));
         for _ in 0..CUTS {
             let mut left = nnls::solve(&columns, &target).residual;
             if length(&left) <= nothing {
@@ -115,13 +116,13 @@ impl Cones {
             }
             let motion = &left[..motions];
             let more = self.against(motion);
-            let most = (0..self.discs.len()).map(|group| unit(row(&self.most(group, motion), &|of| of == group)));
+            let most = (0..self.discs.len()).map(|group| unit(row(&self.most(group, motion), Some(group))));
             let most: Vec<Vec<f64>> = most.filter(|most| dot(most, &left) > RESISTS * length(&left)).collect();
             if more.is_empty() && most.is_empty() {
                 left.truncate(motions);
                 return Balance { pushes, left };
             }
-            columns.extend(more.iter().map(|push| row(push, &|_| false)).chain(most));
+            columns.extend(more.iter().map(|push| row(push, None)).chain(most));
             pushes.extend(more);
         }
         Balance { pushes, left: none }
@@ -130,12 +131,8 @@ impl Cones {
     /// The force of each cone that resists a motion most, of those that resist it.
     pub fn against(&self, motion: &[f64]) -> Vec<Vec<f64>> {
         let most = |[normal, first, second]: &[Vec<f64>; 3]| {
-            let (a, b) = (dot(first, motion), dot(second, motion));
-            let size = a.hypot(b);
-            if size == 0.0 {
-                return None;
-            }
-            let force = unit(combined(normal, (a / size, first), (b / size, second)));
+            let [a, b] = against_motion([first, second], motion)?;
+            let force = unit(combined(normal, (a, first), (b, second)));
             (dot(&force, motion) > RESISTS * length(motion)).then_some(force)
         };
         self.axes.iter().filter_map(most).collect()
@@ -145,10 +142,8 @@ impl Cones {
     fn most(&self, group: usize, motion: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; motion.len()];
         for [first, second] in &self.discs[group] {
-            let (a, b) = (dot(first, motion), dot(second, motion));
-            let size = a.hypot(b);
-            if size > 0.0 {
-                sum = combined(&sum, (a / size, first), (b / size, second));
+            if let Some([a, b]) = against_motion([first, second], motion) {
+                sum = combined(&sum, (a, first), (b, second));
             }
         }
         sum
@@ -160,6 +155,13 @@ pub(super) const CUTS: usize = 100;
 
 /// A force resists a motion if it is along it by more than this share.
 const RESISTS: f64 = 1e-8;
+
+/// The point of the unit circle whose force, of two along a surface, resists a motion most; `None` where neither does.
+fn against_motion(forces: [&Vec<f64>; 2], motion: &[f64]) -> Option<[f64; 2]> {
+    let along = forces.map(|force| dot(force, motion));
+    let size = along[0].hypot(along[1]);
+    (size > 0.0).then(|| along.map(|along| along / size))
+}
 
 /// `x + a y + b z`.
 fn combined(x: &[f64], (a, y): (f64, &[f64]), (b, z): (f64, &[f64])) -> Vec<f64> {

@@ -127,12 +127,6 @@ pub fn solve_tightly(ranks: usize, scene: &str, sets: &[&str]) -> Run {
     solve(ranks, scene, &[&TIGHT[..], sets].concat()).converged()
 }
 
-/// What an independent program found, of `tests/reference`.
-pub fn reference(name: &str) -> Value {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/reference/{name}.json"));
-    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
-}
-
 /// Checks a scene without solving it.
 pub fn check(ranks: usize, scene: &str, level: usize, sets: &[&str]) -> Run {
     scene_command("check", ranks, scene, level, sets, &[], tempfile::tempdir().unwrap())
