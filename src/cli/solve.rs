@@ -54,7 +54,7 @@ pub struct Solve {
 /// When coarser levels are solved first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Cascade {
-    /// Where the problem is not linear, for the active set.
+    /// Where the problem is not linear.
     Auto,
     /// Always.
     On,
@@ -65,13 +65,12 @@ pub enum Cascade {
 impl Cascade {
     /// The levels to solve before `level`, coarsest first. None where there is a history, of which a coarser
     /// level knows the end, or an earlier state, which is of one mesh, or a body that is no brick, or meshes are refined,
-    /// or a limit load, which has its own start. SMALSE-M gains nothing by a good start.
+    /// or a limit load, which has its own start.
     pub(super) fn before(self, level: usize, scene: &Scene) -> Vec<usize> {
         let linear = scene.contact.is_empty() && !scene.material.values().any(Law::yields);
         let has_history = !scene.step.is_empty() || scene.initial.is_some() || scene.limit.is_some();
         let possible = !has_history && scene.is_of_bricks() && scene.solver.error.is_none();
-        let gains = !linear && scene.solver.qp == Qp::ActiveSet;
-        if self == Self::Off || !possible || (self == Self::Auto && !gains) {
+        if self == Self::Off || !possible || (self == Self::Auto && linear) {
             return Vec::new();
         }
         let half = |l: &usize| (*l > 1).then(|| l.div_ceil(2));

@@ -12,7 +12,8 @@ use crate::feti::dual::operator::DualOperator;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::preconditioner::Preconditioner;
 use crate::monitor::timing::Timer;
-use crate::qp::active_set::Face;
+use crate::qp::active_set;
+use crate::qp::feasible::Face;
 use crate::qp::quadratic::{Quadratic, Space};
 use crate::qp::slides::Slides;
 
@@ -72,6 +73,22 @@ impl<'a> Dual<'_, 'a> {
         true
     }
 
+    /// `z = M r` for rows of a face on which slips hang on springs; false if there is no preconditioner.
+    fn precondition_on(&mut self, rows: &CoarseFace, slides: &Slides, r: &[f64], z: &mut [f64]) -> bool {
+        if slides.is_empty() {
+            return self.precondition(r, z);
+        }
+        let mut soft = r.to_vec();
+        slides.soften(&mut soft);
+        let is_there = self.precondition(&soft, z);
+        if is_there {
+            rows.mask(z);
+            slides.soften(z);
+            slides.add_springs(r, z);
+        }
+        is_there
+    }
+
     /// Contributions of each own subdomain to `x'x` and `x'r`, to the products of `x` with each of `against`, and to those of
     /// `pairs`; and the number of products.
     fn partial(&self, (x, r): (&[f64], &[f64]), against: &[&[f64]], pairs: &[(&[f64], &[f64])]) -> (Vec<f64>, usize) {
@@ -82,12 +99,24 @@ impl<'a> Dual<'_, 'a> {
     }
 }
 
-/// The dual problem on all rows, for solvers that want an orthogonal projector.
+/// The dual problem on all rows, for a solver that wants an orthogonal projector. On faces it is preconditioned like [`DualFace`].
 pub struct WholeDual<'s, 'a> {
-    /// `F` and the preconditioner.
-    pub dual: Dual<'s, 'a>,
+    dual: Dual<'s, 'a>,
     /// `P`.
-    pub projector: Projector<'s, 'a>,
+    projector: Projector<'s, 'a>,
+    /// The rows of B.
+    constraints: &'s Constraints,
+    /// What discs of friction do on the face.
+    slides: Slides,
+    /// The rows of the face.
+    rows: Option<CoarseFace>,
+}
+
+impl<'s, 'a> WholeDual<'s, 'a> {
+    /// With discs of friction of which nothing need be known. No face is entered yet.
+    pub fn new(dual: Dual<'s, 'a>, projector: Projector<'s, 'a>, constraints: &'s Constraints, slides: Slides) -> Self {
+        Self { dual, projector, constraints, slides, rows: None }
+    }
 }
 
 impl Quadratic for WholeDual<'_, '_> {
@@ -113,6 +142,55 @@ impl Quadratic for WholeDual<'_, '_> {
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         self.dual.precondition(r, z)
+    }
+
+    fn enter(&mut self, face: &Face) {
+        let mut slides = self.slides.clone();
+        slides.press(&face.places);
+        let mut kept = face.free.clone();
+        slides.mark(&mut kept);
+        let Dual { coarse, space, timer, .. } = self.dual;
+        let is_known = self.rows.as_ref().is_some_and(|rows| rows.kept() == kept) && slides == self.slides;
+        if space.maximum(f64::from(!is_known)) == 0.0 {
+            return;
+        }
+        self.dual.restrict_scaling(self.constraints, &kept);
+        let across = sliding(&slides);
+        self.rows = Some(timer.time("coarse set-up", || match &self.rows {
+            Some(rows) => rows.with(coarse, space, kept, across),
+            None => CoarseFace::sliding(coarse, kept, across),
+        }));
+        self.slides = slides;
+    }
+
+    /// With `L` and `P = I - L G` of the face: `P M P' + L G G' L' / penalty`. The second term is for what violates equilibrium. Without
+    /// a preconditioner `M` is 1 / size.
+    fn precondition_on_face(&mut self, [size, penalty]: [f64; 2], r: &[f64], z: &mut [f64]) -> bool {
+        let Some(rows) = &self.rows else { return false };
+        let Dual { coarse, timer, .. } = self.dual;
+        let (mut inside, mut beside) = (r.to_vec(), vec![0.0; r.len()]);
+        let missing = timer.time("coarse problem", || {
+            rows.reduce(coarse, &mut inside);
+            coarse.add_transpose(1.0 / penalty, &rows.amplitudes(coarse, r), &mut beside);
+            coarse.apply(&beside)
+        });
+        if !self.dual.precondition_on(rows, &self.slides, &inside, z) {
+            z.copy_from_slice(&inside);
+            self.slides.relax(size, z);
+            z.iter_mut().for_each(|z| *z /= size);
+        }
+        timer.time("coarse problem", || {
+            rows.project(coarse, z);
+            rows.add_balance(coarse, missing, z);
+        });
+        true
+    }
+
+    fn balance(&mut self, target: &[f64], x: &mut [f64]) {
+        let Some(rows) = &self.rows else { return };
+        let Dual { coarse, timer, .. } = self.dual;
+        let missing: Vec<f64> = target.iter().zip(&*x).map(|(target, x)| target - x).collect();
+        timer.time("coarse problem", || rows.add_balance(coarse, coarse.apply(&missing), x));
     }
 }
 
@@ -215,22 +293,11 @@ impl Quadratic for DualFace<'_, '_> {
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
-        if self.slides.is_empty() {
-            return self.dual.precondition(r, z);
-        }
-        let mut soft = r.to_vec();
-        self.slides.soften(&mut soft);
-        let is_there = self.dual.precondition(&soft, z);
-        if is_there {
-            self.rows.mask(z);
-            self.slides.soften(z);
-            self.slides.add_springs(r, z);
-        }
-        is_there
+        self.dual.precondition_on(&self.rows, &self.slides, r, z)
     }
 }
 
-impl Face for DualFace<'_, '_> {
+impl active_set::Face for DualFace<'_, '_> {
     fn restrict(&mut self, kept: &mut [bool], slides: &Slides) -> bool {
         let timer = self.dual.timer;
         let Dual { coarse, space, .. } = self.dual;

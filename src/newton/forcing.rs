@@ -20,13 +20,6 @@ const FLOOR: f64 = 0.5;
 /// What the floor is lowered by beyond the ratio of wanted to true residual.
 const MARGIN: f64 = 0.3;
 
-/// Reductions for SMALSE-M, where a digit costs several times what it costs the active set: in the first step, ...
-const FIRST_OF_SMALSE: f64 = 0.5;
-/// ... in steps after one that did little, which may be the last program's fault, ...
-const SLOW_OF_SMALSE: f64 = 0.05;
-/// ... and in others. More Newton steps are cheaper there.
-const OF_SMALSE: f64 = 0.2;
-
 /// Accuracy of a quadratic program.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Forcing {
@@ -57,16 +50,6 @@ impl Forcing {
         }
     }
 
-    /// By what SMALSE-M reduces the first gradient of the program. Another attempt gets what it asks for.
-    pub fn of_smalse(&self) -> f64 {
-        match self.left {
-            0.0 if self.drop == FIRST => FIRST_OF_SMALSE,
-            0.0 => self.drop,
-            _ if self.drop >= LOOSEST => SLOW_OF_SMALSE,
-            _ => OF_SMALSE,
-        }
-    }
-
     /// For another attempt at a step that did not lower the energy.
     pub fn tighten(&mut self) {
         self.drop *= FIRST;
@@ -89,17 +72,5 @@ mod tests {
         forcing.update(0.05, 1e-5, 1e-6, true);
         assert_eq!((forcing.drop, forcing.left), (TIGHTEST, LOOSEST));
         assert!((forcing.floor - FLOOR * 0.1 * MARGIN).abs() < 1e-15);
-    }
-
-    #[test]
-    fn smalse_is_asked_for_less_but_in_another_attempt() {
-        let mut forcing = Forcing::default();
-        assert_eq!(forcing.of_smalse(), FIRST_OF_SMALSE);
-        forcing.tighten();
-        assert_eq!(forcing.of_smalse(), forcing.drop);
-        forcing.update(1.0, 0.9, 1e-6, false);
-        assert_eq!(forcing.of_smalse(), SLOW_OF_SMALSE);
-        forcing.update(0.9, 0.01, 1e-6, false);
-        assert_eq!(forcing.of_smalse(), OF_SMALSE);
     }
 }

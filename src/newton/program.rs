@@ -176,7 +176,6 @@ impl Programs {
             wasted = found.statistics;
             dual.restrict_scaling(problem.constraints, &vec![true; b.len()]);
         }
-        let limits = Limits { drop: forcing.of_smalse(), ..limits };
         let mut found = self.smalse(problem, dual, lambda, b, limits)?;
         found.statistics += wasted;
         Ok(found)
@@ -291,7 +290,7 @@ impl Programs {
         let (timer, coarse) = (dual.timer, dual.coarse);
         let space = Multipliers(problem.space, timer);
         let projector = timer.time("coarse set-up", || coarse.projector())?;
-        let mut dual = WholeDual { dual, projector };
+        let mut dual = WholeDual::new(dual, projector, problem.constraints, self.slides.clone());
         let mut projected = b.clone();
         let mean = timer.time("coarse problem", || projector.project(&mut projected));
         let mut statistics = Statistics::default();

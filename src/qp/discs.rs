@@ -186,28 +186,11 @@ impl Disc {
         }
     }
 
-    /// Projects the pair of z onto what may move: everything inside, the tangent of a pair that slides, nothing otherwise. With
-    /// k the circle's curvature, the tangent is scaled by (1 + k / size)^-1/2, and by 0 if k is larger than
-    /// `most`. This is half of a preconditioner for a Hessian of that size with what [`Disc::bend`] adds.
-    pub fn restrict(&self, place: Place, size: f64, most: f64, z: &mut [f64]) {
-        let along = match place {
-            Place::Inside => return,
-            Place::Sliding { normal, curvature } if curvature <= most => {
-                let along = tangential(normal, self.of(z)) / (1.0 + curvature / size).sqrt();
-                [-normal[1] * along, normal[0] * along]
-            }
-            _ => [0.0; 2],
-        };
-        self.put(z, along);
-    }
-
-    /// `z = scale t t'r / (1 + k / size)` on the tangent t of a pair that slides, if the circle's curvature k is larger than
-    /// `least`: the diagonal preconditioner, in the place of [`Disc::restrict`]'s.
-    pub fn relax(&self, place: Place, size: f64, least: f64, scale: f64, r: &[f64], z: &mut [f64]) {
-        if let Place::Sliding { normal, curvature } = place
-            && curvature > least
-        {
-            let along = scale * tangential(normal, self.of(r)) / (1.0 + curvature / size);
+    /// Divides the tangent of a pair that slides by 1 + k / size, with k the circle's curvature: a diagonal preconditioner for a
+    /// Hessian of that size with what [`Disc::bend`] adds.
+    pub fn relax(&self, place: Place, size: f64, z: &mut [f64]) {
+        if let Place::Sliding { normal, curvature } = place {
+            let along = tangential(normal, self.of(z)) / (1.0 + curvature / size);
             self.put(z, [-normal[1] * along, normal[0] * along]);
         }
     }

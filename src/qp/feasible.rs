@@ -46,7 +46,7 @@ impl FeasibleSet {
     }
 
     /// This rank's discs.
-    fn discs(&self) -> &[Disc] {
+    pub(super) fn discs(&self) -> &[Disc] {
         self.discs.as_deref().unwrap_or_default()
     }
 
@@ -109,14 +109,6 @@ impl FeasibleSet {
         active
     }
 
-    /// `z = 0` on the active set of `x`.
-    pub fn mask(&self, x: &[f64], z: &mut [f64]) {
-        self.mask_bounds(x, z);
-        for disc in self.discs().iter().filter(|disc| disc.is_active(x)) {
-            disc.entries.into_iter().for_each(|i| z[i] = 0.0);
-        }
-    }
-
     /// `z = 0` on the active bounds of `x`.
     pub fn mask_bounds(&self, x: &[f64], z: &mut [f64]) {
         for ((z, x), lower) in z.iter_mut().zip(x).zip(&self.lower) {
@@ -157,15 +149,15 @@ impl FeasibleSet {
         self.discs().iter().zip(places).for_each(|(disc, place)| disc.bend(*place, p, hp));
     }
 
-    /// Projects `z` onto the entries that are free and the tangents of pairs that slide, see [`Disc::restrict`].
-    pub fn restrict(&self, places: &[Place], size: f64, most: f64, x: &[f64], z: &mut [f64]) {
-        self.mask_bounds(x, z);
-        self.discs().iter().zip(places).for_each(|(disc, place)| disc.restrict(*place, size, most, z));
+    /// The face that `x` is on, where the gradient presses pairs that are on their circles.
+    pub fn face(&self, x: &[f64], gradient: &[f64]) -> Face {
+        let places = self.discs().iter().map(|disc| disc.place(x, gradient)).collect();
+        Face { free: self.active(x).into_iter().map(|active| !active).collect(), places }
     }
 
-    /// Sets `z` on the tangents of pairs that slide, see [`Disc::relax`].
-    pub fn relax(&self, places: &[Place], size: f64, least: f64, scale: f64, r: &[f64], z: &mut [f64]) {
-        self.discs().iter().zip(places).for_each(|(disc, place)| disc.relax(*place, size, least, scale, r, z));
+    /// Scales `z` on the tangents of pairs that slide, see [`Disc::relax`].
+    pub fn relax(&self, places: &[Place], size: f64, z: &mut [f64]) {
+        self.discs().iter().zip(places).for_each(|(disc, place)| disc.relax(*place, size, z));
     }
 
     /// `z = x - old`, without rounding across circles.
@@ -175,6 +167,15 @@ impl FeasibleSet {
         }
         self.discs().iter().for_each(|disc| disc.difference(x, old, z));
     }
+}
+
+/// A face of the set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Face {
+    /// The entries that are neither on their bound nor on their circle.
+    pub free: Vec<bool>,
+    /// Where the pairs of this rank's discs are: those that slide may move along their tangents, too.
+    pub places: Vec<Place>,
 }
 
 /// A gradient split by [`FeasibleSet::split`].

@@ -3,16 +3,15 @@
 //!
 //! Dostal and Schoberl, Comput. Optim. Appl. 30 (2005); Dostal and Kozubek, Math. Program. 135 (2012). While the chopped
 //! gradient is small against the free one (|beta|^2 <= Gamma^2 phi~'phi) it takes conjugate gradient steps on the free
-//! set; a step that would leave the set becomes an *expansion* of the active set; otherwise a *proportioning* step along
-//! the chopped gradient releases entries. Optionally conjugate gradients are preconditioned *in the face*,
-//! z = mask(M mask(g)) with one M for all faces.
+//! set; a step that would leave the set becomes an *expansion* of the active set (`expand.rs`); otherwise a *proportioning* step along
+//! the chopped gradient releases entries. Optionally conjugate gradients are preconditioned *in the face*: the function is told of
+//! each face that they begin in (chapter 5.10 of Dostal's book of 2009 has one preconditioner for all faces).
 //!
-//! The cost never rises: an expansion that failed to lower it is replaced by one that cannot fail. The gradient is
-//! updated along CG steps and is computed afresh after expansions. Pairs of entries on the circle of their disc slide along it
-//! by the steps of `slide.rs`; without discs nothing of that is done. Beside x goes its *defect*, the part that violates
-//! equality constraints: SMALSE-M penalises it and stops by it.
+//! The cost never rises. The gradient is updated along CG steps and is computed afresh after expansions. Pairs of entries on the
+//! circle of their disc slide along it by the steps of `slide.rs`; without discs nothing of that is done. Beside x goes its *defect*,
+//! the part that violates equality constraints: SMALSE-M penalises it and stops by it.
 
-use super::feasible::{FeasibleSet, Parts};
+use super::feasible::{Face, FeasibleSet, Parts};
 use super::quadratic::Space;
 use super::{Outcome, Statistics, axpy};
 
@@ -20,16 +19,21 @@ use super::{Outcome, Statistics, axpy};
 const PROPORTION: f64 = 1.0;
 /// Length of gradient steps times the norm of H: below the largest admissible 2 (Dostal and Kozubek 2012).
 const FIXED_STEP: f64 = 1.9;
-/// How often an underestimated norm of H is doubled before an expansion is accepted as it is.
-const DOUBLINGS: usize = 4;
 
 /// The quadratic function's matrix, seen with the equality constraints that it penalises.
 pub trait Hessian {
     /// `hp = H p`, and `defect` the part of `p` that violates equality constraints (zero if there are none).
     fn apply(&mut self, p: &[f64], hp: &mut [f64], defect: &mut [f64]);
 
-    /// `z = M r` with M an approximate inverse of H; returns false, and leaves `z` alone, if there is none.
+    /// From now on preconditioner and balance are about this face.
+    fn enter(&mut self, face: &Face);
+
+    /// `z = M r` with M an approximate inverse, on the face, of H and what circles add to it; returns false, and leaves `z` alone, if
+    /// there is none.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool;
+
+    /// Changes `x` on the face so that it violates equality constraints as `target` does. A guess is enough.
+    fn balance(&mut self, target: &[f64], x: &mut [f64]);
 }
 
 /// The iterate with what belongs to it.
@@ -75,16 +79,14 @@ struct Squares {
     reduced: f64,
     /// Of the defect.
     defect: f64,
-    /// phi'H p with the last H p.
-    free_hp: f64,
     /// Of the part of phi that pairs can slide by.
     tangent: f64,
 }
 
 impl Squares {
     fn is_finite(&self) -> bool {
-        let Self { free, chopped, reduced, defect, free_hp, tangent } = self;
-        [free, chopped, reduced, defect, free_hp, tangent].iter().all(|v| v.is_finite())
+        let Self { free, chopped, reduced, defect, tangent } = self;
+        [free, chopped, reduced, defect, tangent].iter().all(|v| v.is_finite())
     }
 
     /// By the projected gradient phi + beta.
@@ -128,6 +130,9 @@ pub struct Mprgp<'a> {
     old: Vec<f64>,
     old_gradient: Vec<f64>,
     way: Vec<f64>,
+    target: Vec<f64>,
+    /// The share of its step that the last expansion went.
+    share: f64,
 }
 
 impl<'a> Mprgp<'a> {
@@ -147,7 +152,9 @@ impl<'a> Mprgp<'a> {
             z: zero(),
             old: zero(),
             old_gradient: zero(),
-            way: Vec::new(),
+            way: zero(),
+            target: zero(),
+            share: 1.0,
         }
     }
 
@@ -191,7 +198,7 @@ impl<'a> Mprgp<'a> {
                 continue;
             }
             if proportional {
-                self.conjugate(hessian, &point.x, &squares, last, statistics);
+                self.conjugate(hessian, point, last, statistics);
             } else {
                 self.p.copy_from_slice(&self.parts.chopped);
             }
@@ -217,7 +224,7 @@ impl<'a> Mprgp<'a> {
                 last = proportional.then_some(curvature);
                 *if proportional { &mut statistics.cg } else { &mut statistics.proportionings } += 1;
             } else {
-                self.expand(hessian, b, point, statistics, step, reach);
+                self.expand(hessian, b, point, statistics, &line);
                 last = None;
                 statistics.expansions += 1;
             }
@@ -240,13 +247,13 @@ impl<'a> Mprgp<'a> {
         let Parts { free, chopped, reduced, tangent, .. } = &self.parts;
         let defect = &point.defect;
         let mut pairs: Vec<(&[f64], &[f64])> =
-            vec![(free, free), (chopped, chopped), (reduced, free), (defect, defect), (free, &self.hp)];
+            vec![(free, free), (chopped, chopped), (reduced, free), (defect, defect)];
         if self.set.has_discs() {
             pairs.push((tangent, tangent));
         }
         let d = self.space.dots(&pairs);
-        let tangent = d.get(5).copied().unwrap_or(0.0);
-        Squares { free: d[0], chopped: d[1], reduced: d[2], defect: d[3], free_hp: d[4], tangent }
+        let tangent = d.get(4).copied().unwrap_or(0.0);
+        Squares { free: d[0], chopped: d[1], reduced: d[2], defect: d[3], tangent }
     }
 
     /// The cost along the direction p, by one product with H; `None` if something is not finite.
@@ -268,89 +275,37 @@ impl<'a> Mprgp<'a> {
         point.age += 1;
     }
 
-    /// The next CG direction: the (preconditioned) free gradient, H-conjugate to the last direction if there is one.
-    fn conjugate(
-        &mut self,
-        hessian: &mut dyn Hessian,
-        x: &[f64],
-        squares: &Squares,
-        last: Option<f64>,
-        statistics: &mut Statistics,
-    ) {
-        let mut z_hp = squares.free_hp;
-        let mut z = &self.parts.free;
-        if squares.free > 0.0 && hessian.precondition(&self.parts.free, &mut self.z) {
-            statistics.preconditioner += 1;
-            self.set.mask(x, &mut self.z);
-            let d = self.space.dots(&[(&self.z, &self.hp), (&self.z, &self.parts.free)]);
-            // A preconditioner that is not positive in this face is not used.
-            if d[1] > 0.0 {
-                (z_hp, z) = (d[0], &self.z);
-            }
+    /// The next CG direction: the (preconditioned) free gradient, H-conjugate to the last direction if there is one. Where there is
+    /// none the face may be a new one.
+    fn conjugate(&mut self, hessian: &mut dyn Hessian, point: &Point, last: Option<f64>, statistics: &mut Statistics) {
+        if last.is_none() {
+            hessian.enter(&self.set.face(&point.x, &point.gradient));
         }
-        let beta = last.map_or(0.0, |curvature| z_hp / curvature);
-        for (p, z) in self.p.iter_mut().zip(z) {
+        let mut products = [0.0; 2];
+        if hessian.precondition(&self.parts.free, &mut self.z) {
+            statistics.preconditioner += 1;
+            products = self.products();
+        }
+        if products[1] <= 0.0 {
+            // There is no M, or it is not positive in this face.
+            self.z.copy_from_slice(&self.parts.free);
+            self.set.relax(&self.parts.places, self.size, &mut self.z);
+            products = self.products();
+        }
+        let beta = last.map_or(0.0, |curvature| products[0] / curvature);
+        for (p, z) in self.p.iter_mut().zip(&self.z) {
             *p = z - beta * *p;
         }
     }
 
-    /// A step along p of length `step` runs into bounds at `reach`.
-    fn expand(
-        &mut self,
-        hessian: &mut dyn Hessian,
-        b: &[f64],
-        point: &mut Point,
-        statistics: &mut Statistics,
-        step: f64,
-        reach: f64,
-    ) {
-        self.old.copy_from_slice(&point.x);
-        self.old_gradient.copy_from_slice(&point.gradient);
-        if step.is_finite() {
-            self.set.advance(&mut point.x, step, &self.p);
-            point.refresh(hessian, b, statistics);
-            if self.lowered(point, 0.0) {
-                return;
-            }
-        }
-
-        // To the bound, where the gradient costs nothing; from there a gradient step.
-        self.set.advance(&mut self.old, reach, &self.p);
-        axpy(-reach, &self.hp, &mut self.old_gradient);
-        self.descend(hessian, b, point, statistics);
-    }
-
-    /// A gradient step of fixed length from `old`, which lowers the cost if it is short enough. Pairs on circles take part: the
-    /// projection makes a step along the circle of theirs.
-    fn descend(&mut self, hessian: &mut dyn Hessian, b: &[f64], point: &mut Point, statistics: &mut Statistics) {
-        self.parts.free.copy_from_slice(&self.old_gradient);
-        self.set.mask_bounds(&self.old, &mut self.parts.free);
-        let norm = self.norm;
-        for _ in 0..=DOUBLINGS {
-            point.x.copy_from_slice(&self.old);
-            self.set.advance(&mut point.x, FIXED_STEP / self.norm, &self.parts.free);
-            point.refresh(hessian, b, statistics);
-            if self.lowered(point, 0.0) {
-                return;
-            }
-            self.norm *= 2.0;
-        }
-        if self.set.has_discs() {
-            // Not the norm was wrong: rounding is felt on circles, and hides whether the cost falls.
-            self.norm = norm;
-        }
-    }
-
-    /// Whether the cost has fallen by this at least from `old` to the point: the difference is (x - old)'(g + old g) / 2, free of
-    /// the cancellation that the difference of two costs would suffer.
-    fn lowered(&mut self, point: &Point, least: f64) -> bool {
-        self.set.difference(&point.x, &self.old, &mut self.z);
-        let d = self.space.dots(&[(&self.z, &point.gradient), (&self.z, &self.old_gradient)]);
-        // NaN ends the loop at the next test.
-        d[0] + d[1] <= -2.0 * least || d[0].is_nan()
+    /// z'H p with the last H p, and z'phi.
+    fn products(&self) -> [f64; 2] {
+        let d = self.space.dots(&[(&self.z, &self.hp), (&self.z, &self.parts.free)]);
+        [d[0], d[1]]
     }
 }
 
+mod expand;
 mod slide;
 
 #[cfg(test)]

@@ -1,14 +1,15 @@
 //! The Hessian P A P + rho Q of the augmented Lagrangian, Q = I - P: one product with A and two projections.
-//!
-//! The preconditioner is P M P + Q / rho. Like the Hessian it acts on Ker G and on Im G' separately.
 
 use super::axpy;
+use super::feasible::Face;
 use super::mprgp::{Hessian, Point};
 use super::quadratic::Quadratic;
 
 /// The Hessian P A P + rho Q.
 pub(super) struct Penalised<'a> {
     pub function: &'a mut dyn Quadratic,
+    /// Of P A P.
+    pub size: f64,
     pub penalty: f64,
     /// Work space, as long as x.
     pub inside: Vec<f64>,
@@ -36,16 +37,15 @@ impl Hessian for Penalised<'_> {
         }
     }
 
+    fn enter(&mut self, face: &Face) {
+        self.function.enter(face);
+    }
+
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
-        self.inside.copy_from_slice(r);
-        self.function.project(&mut self.inside);
-        if !self.function.precondition(&self.inside, z) {
-            return false;
-        }
-        self.function.project(z);
-        for ((z, r), inside) in z.iter_mut().zip(r).zip(&self.inside) {
-            *z += (r - inside) / self.penalty;
-        }
-        true
+        self.function.precondition_on_face([self.size, self.penalty], r, z)
+    }
+
+    fn balance(&mut self, target: &[f64], x: &mut [f64]) {
+        self.function.balance(target, x);
     }
 }

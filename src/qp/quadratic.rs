@@ -3,6 +3,8 @@
 //! Vectors are slices of one rank's entries; several ranks may hold the same entry. Everything a solver branches on
 //! must come out of [`Space`], whose results are the same bits on every rank.
 
+use super::feasible::Face;
+
 /// Inner products and reductions over a distributed vector.
 pub trait Space {
     /// `x'y` of each pair, in one collective.
@@ -59,4 +61,17 @@ pub trait Quadratic {
     /// `z = M r` with M an approximate inverse of A, symmetric and positive on Ker G; returns false, and leaves `z`
     /// alone, if there is none.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool;
+
+    /// From now on [`Quadratic::precondition_on_face`] and [`Quadratic::balance`] are about this face. Functions without faces need
+    /// none of the three. Collective.
+    fn enter(&mut self, _face: &Face) {}
+
+    /// `z = M r` with M an approximate inverse, on the face, of P A P + penalty (I - P) and what circles add to it, with the `size` of
+    /// P A P; `r` and `z` are zero where the face has no freedom. Returns false, and leaves `z` alone, if there is none.
+    fn precondition_on_face(&mut self, [_size, _penalty]: [f64; 2], _r: &[f64], _z: &mut [f64]) -> bool {
+        false
+    }
+
+    /// Changes `x` on the face so that `G x = G target`. A guess is enough.
+    fn balance(&mut self, _target: &[f64], _x: &mut [f64]) {}
 }

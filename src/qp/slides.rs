@@ -192,6 +192,20 @@ impl Slides {
         }
     }
 
+    /// Follows a face of given radii, for differences of unknowns: what is pressed against its circle hangs on the circle's curvature, and
+    /// does not move along its normal.
+    pub fn press(&mut self, places: &[discs::Place]) {
+        for (state, place) in self.states.iter_mut().zip(places) {
+            *state = match *place {
+                discs::Place::Inside => Slide::Stick,
+                discs::Place::Point | discs::Place::Leaving { .. } => Slide::Open,
+                discs::Place::Sliding { normal, curvature } => {
+                    Slide::Slip { direction: normal, radius: 0.0, compliance: curvature }
+                }
+            };
+        }
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.discs.is_empty()
@@ -278,8 +292,18 @@ impl Slides {
 
     /// Scales a vector by the share of the matrix that springs leave to the rest: `f / (f + c)` across slips.
     pub fn soften(&self, x: &mut [f64]) {
+        self.give_way(|disc| disc.flexibility, x);
+    }
+
+    /// Divides by 1 + c / size across slips: the inverse of a matrix of this size with springs, times the size.
+    pub fn relax(&self, size: f64, x: &mut [f64]) {
+        self.give_way(|_| size, x);
+    }
+
+    /// `f / (f + c)` across slips.
+    fn give_way(&self, flexibility: impl Fn(&Disc) -> f64, x: &mut [f64]) {
         for (disc, direction, compliance) in self.slipping() {
-            let taken = compliance / (disc.flexibility + compliance) * disc.across(direction, x);
+            let taken = compliance / (flexibility(disc) + compliance) * disc.across(direction, x);
             let ([a, b], across) = (disc.of(x), across(direction));
             disc.put([a - taken * across[0], b - taken * across[1]], x);
         }

@@ -35,7 +35,7 @@ const AGE: usize = 50;
 pub struct Problem<'a> {
     /// Inner products.
     pub space: &'a dyn Space,
-    /// A and P; a preconditioner M is used as P M P + Q / rho in faces.
+    /// A and P, perhaps with a preconditioner on faces.
     pub function: &'a mut dyn Quadratic,
     /// b; only P b matters.
     pub b: &'a [f64],
@@ -89,7 +89,7 @@ pub fn solve(problem: Problem, settings: &Settings, start: Start) -> Solution {
     let Prepared { mut right, mut multiplier, x, inside } = prepare(function, set, b, start);
     let norm = settings.norm;
     let penalty = PENALTY * norm;
-    let mut hessian = Penalised { function, penalty, inside };
+    let mut hessian = Penalised { function, size: norm, penalty, inside };
     let mut inner = Mprgp::new(space, set, penalty, settings.limits.products).with_size(norm);
     let mut statistics = Statistics::default();
     let mut point = first_point(space, &mut hessian, &right, x, &mut statistics);

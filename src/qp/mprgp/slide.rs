@@ -8,15 +8,13 @@
 //! cannot fail. All accepted steps lower the cost by a fixed part, at least, of what such a step is sure to do.
 
 use super::{FIXED_STEP, Hessian, Line, Mprgp, Norms, Point, Squares};
-use crate::qp::{Outcome, Statistics};
+use crate::qp::{Outcome, Statistics, axpy};
 
 /// A run ends when the model's free gradient is this part of the first.
 const RUN: f64 = 0.03;
 /// The cost falls by this part of step |phi~||phi|, or the move is taken back: a step of fixed length below 2 / |H| does
 /// more.
 const LEAST: f64 = 0.01;
-/// The curvature of a circle is stiff if it is so many times larger than the Hessian.
-const STIFF: f64 = 10.0;
 /// The parts of a move that are tried if the whole one fails.
 const PARTS: [f64; 2] = [0.25, 0.05];
 
@@ -36,26 +34,24 @@ impl Mprgp<'_> {
         self.old_gradient.copy_from_slice(&point.gradient);
         let least = LEAST * FIXED_STEP / self.norm * first.reduced;
         let mut last = None;
-        self.way.resize(point.x.len(), 0.0);
         let end = loop {
-            self.conjugate_on_tangents(hessian, &point.x, last, statistics);
+            self.conjugate(hessian, point, last, statistics);
             let Some(line) = self.line(hessian, point, statistics) else {
                 break Err(Outcome::NotFinite);
             };
-            let Line { curvature, slope, reach } = line;
             let step = line.step();
-            if step.min(reach) == f64::INFINITY {
+            if step.min(line.reach) == f64::INFINITY {
                 break Err(Outcome::Unbounded);
             }
-            if slope <= 0.0 {
+            if line.slope <= 0.0 {
                 break Ok(None);
             }
-            if step > reach {
-                break Ok(Some((step, reach)));
+            if step > line.reach {
+                break Ok(Some(line));
             }
             self.walk(point, step);
             statistics.cg += 1;
-            last = Some(curvature);
+            last = Some(line.curvature);
             self.set.split_on_tangents(&point.x, &point.gradient, FIXED_STEP / self.norm, &mut self.parts);
             let squares = self.squares(point);
             if !squares.is_finite() {
@@ -88,20 +84,16 @@ impl Mprgp<'_> {
         b: &[f64],
         point: &mut Point,
         statistics: &mut Statistics,
-        beyond: Option<(f64, f64)>,
+        beyond: Option<Line>,
         least: f64,
     ) {
-        if let Some((step, reach)) = beyond {
+        if let Some(line) = &beyond {
             self.way.copy_from_slice(&point.x);
-            if step.is_finite() {
-                self.set.advance(&mut point.x, step, &self.p);
-                point.refresh(hessian, b, statistics);
-                if self.lowered(point, least) {
-                    return;
-                }
+            if self.cut(hessian, b, point, statistics, line, least) {
+                return;
             }
             point.x.copy_from_slice(&self.way);
-            self.set.advance_on_tangents(&self.parts.places, &mut point.x, reach, &self.p);
+            self.set.advance_on_tangents(&self.parts.places, &mut point.x, line.reach, &self.p);
         }
         for ((way, x), old) in self.way.iter_mut().zip(&point.x).zip(&self.old) {
             *way = old - x;
@@ -109,50 +101,12 @@ impl Mprgp<'_> {
         for part in std::iter::once(1.0).chain(PARTS) {
             point.x.copy_from_slice(&self.old);
             self.set.advance(&mut point.x, part, &self.way);
-            point.refresh(hessian, b, statistics);
-            if self.lowered(point, least) {
+            self.target.copy_from_slice(&self.old);
+            axpy(-part, &self.way, &mut self.target);
+            if self.arrive(hessian, b, point, statistics, least) {
                 return;
             }
         }
         self.descend(hessian, b, point, statistics);
-    }
-
-    /// The next direction: the model's free gradient, preconditioned, conjugate to the last direction if there is one.
-    ///
-    /// Circles of small radius are stiff. M knows nothing of them, and with the ways that it would have them go each run would
-    /// end at once: they are scaled by their curvature instead.
-    fn conjugate_on_tangents(
-        &mut self,
-        hessian: &mut dyn Hessian,
-        x: &[f64],
-        last: Option<f64>,
-        statistics: &mut Statistics,
-    ) {
-        let (places, free, size, most) = (&self.parts.places, &self.parts.free, self.size, STIFF * self.size);
-        self.way.copy_from_slice(free);
-        self.set.restrict(places, size, most, x, &mut self.way);
-        let mut products = [0.0, 0.0];
-        if hessian.precondition(&self.way, &mut self.z) {
-            statistics.preconditioner += 1;
-            self.set.restrict(places, size, most, x, &mut self.z);
-            self.set.relax(places, size, most, 1.0 / size, free, &mut self.z);
-            products = self.products();
-        }
-        if products[1] <= 0.0 {
-            // There is no M, or it is not positive in this face.
-            self.z.copy_from_slice(free);
-            self.set.relax(places, size, 0.0, 1.0, free, &mut self.z);
-            products = self.products();
-        }
-        let beta = last.map_or(0.0, |curvature| products[0] / curvature);
-        for (p, z) in self.p.iter_mut().zip(&self.z) {
-            *p = z - beta * *p;
-        }
-    }
-
-    /// z'H p with the last H p, and z'phi.
-    fn products(&self) -> [f64; 2] {
-        let d = self.space.dots(&[(&self.z, &self.hp), (&self.z, &self.parts.free)]);
-        [d[0], d[1]]
     }
 }

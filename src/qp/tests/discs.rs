@@ -1,7 +1,7 @@
 //! Programs with discs beside bounds and equalities, through SMALSE-M and MPRGP. What they find is compared with closed
 //! forms, with the method of multipliers on plain projected gradients, and with the conditions of optimality.
 
-use super::dense::{Joined, Matrix, Null, Plain, Random, distance, dot};
+use super::dense::{Joined, Matrix, Null, OnFaces, Plain, Random, distance, dot};
 use crate::qp::discs::Disc;
 use crate::qp::feasible::FeasibleSet;
 use crate::qp::smalse::{Problem, Settings, Solution, Start, solve};
@@ -58,7 +58,8 @@ impl Case {
         let mut size = self.b.clone();
         self.null.project(&mut size);
         let limits = Limits { reference: Some(dot(&size, &size).sqrt()), ..self.limits };
-        let function = &mut Joined(&mut self.a, &mut self.null, preconditioner);
+        let discs = set.discs().iter().map(|disc| disc.entries).collect();
+        let function = &mut OnFaces::new(Joined(&mut self.a, &mut self.null, preconditioner), discs);
         let problem = Problem { space: &Plain, function, b: &self.b, set };
         solve(problem, &Settings { limits, norm: 1.0 }, Start { x: self.x.clone(), multiplier })
     }
@@ -328,17 +329,18 @@ fn warm_start_at_the_solution() {
 fn units_do_not_matter() {
     let mut case = Case::random(8, 6, 3, 1e2, 1.0, &mut Random::new(49));
     let first = case.solve();
-    // x in units of 1e-3: lengths a thousand times larger, forces as they are.
-    case.b.iter_mut().for_each(|v| *v *= 1e3);
-    case.lower.iter_mut().for_each(|v| *v *= 1e3);
+    // Lengths 1024 times larger, forces as they are. A power of two changes no rounding.
+    let unit = 1024.0;
+    case.b.iter_mut().for_each(|v| *v *= unit);
+    case.lower.iter_mut().for_each(|v| *v *= unit);
     for disc in &mut case.discs {
-        disc.radius *= 1e3;
-        disc.centre = disc.centre.map(|c| 1e3 * c);
+        disc.radius *= unit;
+        disc.centre = disc.centre.map(|c| unit * c);
     }
     let second = case.solve();
     assert_eq!(first.active, second.active);
-    assert!(first.statistics.hessian.abs_diff(second.statistics.hessian) < 8);
-    assert!(first.x.iter().zip(&second.x).all(|(x, y)| (1e3 * x - y).abs() < 1e-4));
+    assert_eq!(first.statistics.hessian, second.statistics.hessian);
+    assert!(first.x.iter().zip(&second.x).all(|(x, y)| unit * x == *y));
 }
 
 #[test]

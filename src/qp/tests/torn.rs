@@ -7,7 +7,7 @@ use crate::qp::active_set::Face;
 use crate::qp::feasible::FeasibleSet;
 use crate::qp::quadratic::Quadratic;
 use crate::qp::smalse::{Problem, Settings, Solution, Start, solve};
-use crate::qp::{Limits, axpy, power};
+use crate::qp::{self, Limits, axpy, power};
 
 /// One equality, on the kept rows and on all rows, with its right-hand side.
 #[derive(Clone)]
@@ -24,6 +24,12 @@ pub struct Torn {
     pub preconditioned: bool,
     lumped: Matrix,
     rows: Vec<Row>,
+    set: Set,
+    face: Option<Set>,
+}
+
+/// Some rows, and the equalities orthonormalised on them.
+struct Set {
     kept: Vec<bool>,
     basis: Vec<Row>,
 }
@@ -69,8 +75,8 @@ impl Torn {
                 }
             }
         }
-        let kept = vec![true; n];
-        Self { f, d, bounded, preconditioned: false, lumped, rows, kept, basis: Vec::new() }
+        let set = Set { kept: vec![true; n], basis: Vec::new() };
+        Self { f, d, bounded, preconditioned: false, lumped, rows, set, face: None }
     }
 }
 
@@ -139,35 +145,15 @@ impl Rows {
     }
 }
 
-impl Quadratic for Torn {
-    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        self.f.apply(x, y);
-    }
-
-    fn project(&mut self, x: &mut [f64]) {
-        x.iter_mut().zip(&self.kept).for_each(|(x, kept)| *x *= f64::from(*kept));
-        for row in &self.basis {
-            axpy(-dot(&row.inside, &*x), &row.inside, x);
-        }
-    }
-
-    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
-        if self.preconditioned {
-            self.lumped.apply(r, z);
-        }
-        self.preconditioned
-    }
-}
-
-impl Face for Torn {
-    fn restrict(&mut self, kept: &mut [bool], _: &Slides) -> bool {
-        self.kept = kept.to_vec();
-        self.basis.clear();
+impl Set {
+    /// Of these rows; and whether they can balance anything.
+    fn of(rows: &[Row], kept: &[bool]) -> (Self, bool) {
+        let mut basis: Vec<Row> = Vec::new();
         let mut possible = true;
-        for row in &self.rows {
-            let inside = row.full.iter().zip(&*kept).map(|(v, kept)| v * f64::from(*kept)).collect();
+        for row in rows {
+            let inside = row.full.iter().zip(kept).map(|(v, kept)| v * f64::from(*kept)).collect();
             let mut row = Row { inside, ..row.clone() };
-            for b in &self.basis {
+            for b in &basis {
                 let c = -dot(&b.inside, &row.inside);
                 axpy(c, &b.inside, &mut row.inside);
                 axpy(c, &b.full, &mut row.full);
@@ -177,19 +163,74 @@ impl Face for Torn {
             possible &= length > 1e-8;
             row.inside.iter_mut().chain(&mut row.full).for_each(|v| *v /= length);
             row.right /= length;
-            self.basis.push(row);
+            basis.push(row);
         }
+        (Self { kept: kept.to_vec(), basis }, possible)
+    }
+
+    fn project(&self, x: &mut [f64]) {
+        x.iter_mut().zip(&self.kept).for_each(|(x, kept)| *x *= f64::from(*kept));
+        for row in &self.basis {
+            axpy(-dot(&row.inside, &*x), &row.inside, x);
+        }
+    }
+}
+
+impl Quadratic for Torn {
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.f.apply(x, y);
+    }
+
+    fn project(&mut self, x: &mut [f64]) {
+        self.set.project(x);
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
+        if self.preconditioned {
+            self.lumped.apply(r, z);
+        }
+        self.preconditioned
+    }
+
+    fn enter(&mut self, face: &qp::feasible::Face) {
+        let (set, possible) = Set::of(&self.rows, &face.free);
+        self.face = possible.then_some(set);
+    }
+
+    fn precondition_on_face(&mut self, [_, penalty]: [f64; 2], r: &[f64], z: &mut [f64]) -> bool {
+        let Some(face) = self.face.as_ref().filter(|_| self.preconditioned) else { return false };
+        let mut inside = r.to_vec();
+        face.project(&mut inside);
+        self.lumped.apply(&inside, z);
+        face.project(z);
+        let mut beside = vec![0.0; r.len()];
+        face.basis.iter().for_each(|row| axpy(dot(&row.inside, r) / penalty, &row.full, &mut beside));
+        face.basis.iter().for_each(|row| axpy(dot(&row.full, &beside), &row.inside, z));
+        true
+    }
+
+    fn balance(&mut self, target: &[f64], x: &mut [f64]) {
+        let Some(face) = &self.face else { return };
+        let missing: Vec<f64> = target.iter().zip(&*x).map(|(target, x)| target - x).collect();
+        face.basis.iter().for_each(|row| axpy(dot(&row.full, &missing), &row.inside, x));
+    }
+}
+
+impl Face for Torn {
+    fn restrict(&mut self, kept: &mut [bool], _: &Slides) -> bool {
+        let (set, possible) = Set::of(&self.rows, kept);
+        self.set = set;
         possible
     }
 
     fn restore(&mut self, x: &mut [f64]) {
-        for row in &self.basis {
+        for row in &self.set.basis {
             axpy(row.right - dot(&row.inside, &*x), &row.inside, x);
         }
     }
 
     fn gaps(&mut self, residual: &mut [f64]) {
-        for row in &self.basis {
+        for row in &self.set.basis {
             axpy(-dot(&row.inside, &*residual), &row.full, residual);
         }
     }
