@@ -128,18 +128,6 @@ impl Quadratic for WholeDual<'_, '_> {
         self.dual.timer.time("coarse problem", || self.projector.project(x));
     }
 
-    fn reduce_with_products(
-        &mut self,
-        _: &dyn Space,
-        x: &mut [f64],
-        r: &[f64],
-        against: &[&[f64]],
-        pairs: &[(&[f64], &[f64])],
-    ) -> ([f64; 2], Vec<f64>) {
-        let (partial, width) = self.dual.partial((x, r), against, pairs);
-        self.dual.timer.time("coarse problem", || self.projector.project_with_sums(x, &partial, width))
-    }
-
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> bool {
         self.dual.precondition(r, z)
     }
@@ -170,8 +158,8 @@ impl Quadratic for WholeDual<'_, '_> {
         let Dual { coarse, timer, .. } = self.dual;
         let (mut inside, mut beside) = (r.to_vec(), vec![0.0; r.len()]);
         let missing = timer.time("coarse problem", || {
-            rows.reduce(coarse, &mut inside);
-            coarse.add_transpose(1.0 / penalty, &rows.amplitudes(coarse, r), &mut beside);
+            let motion = rows.reduce(coarse, &mut inside);
+            coarse.add_transpose(1.0 / penalty, &motion, &mut beside);
             coarse.apply(&beside)
         });
         if !self.dual.precondition_on(rows, &self.slides, &inside, z) {
@@ -276,7 +264,9 @@ impl Quadratic for DualFace<'_, '_> {
     }
 
     fn reduce(&mut self, r: &mut [f64]) {
-        self.dual.timer.time("coarse problem", || self.rows.reduce(self.dual.coarse, r));
+        self.dual.timer.time("coarse problem", || {
+            self.rows.reduce(self.dual.coarse, r);
+        });
     }
 
     fn reduce_with_products(

@@ -150,12 +150,13 @@ impl CoarseFace {
         self.subtract_balance(coarse, e, rows);
     }
 
-    /// `rows = P' rows`. One all-gather.
-    pub fn reduce(&self, coarse: &Coarse, rows: &mut [f64]) {
+    /// `rows = P' rows`; returns `L'rows`. One all-gather.
+    pub fn reduce(&self, coarse: &Coarse, rows: &mut [f64]) -> Vec<f64> {
         self.mask(rows);
-        let (parts, _) = coarse.apply_each(&self.base, (rows, &[]), &[], 0);
-        coarse.add_transpose(-1.0, &self.motion(coarse, &parts), rows);
+        let motion = self.told(coarse, rows);
+        coarse.add_transpose(-1.0, &motion, rows);
         self.mask(rows);
+        motion
     }
 
     /// As [`CoarseFace::reduce`] of rows `x` that are masked already. Returns `|P'x|^2` and `r'P'x` for an `r = P'r`, and sums over
@@ -185,7 +186,12 @@ impl CoarseFace {
     pub fn amplitudes(&self, coarse: &Coarse, rows: &[f64]) -> Vec<f64> {
         let mut masked = rows.to_vec();
         self.mask(&mut masked);
-        let (parts, _) = coarse.apply_each(&self.base, (&masked, &[]), &[], 0);
+        self.told(coarse, &masked)
+    }
+
+    /// `L'rows` of rows that are masked already. One all-gather.
+    fn told(&self, coarse: &Coarse, masked: &[f64]) -> Vec<f64> {
+        let (parts, _) = coarse.apply_each(&self.base, (masked, &[]), &[], 0);
         self.motion(coarse, &parts)
     }
 

@@ -2,7 +2,6 @@
 
 use super::factor::CoarseFactor;
 use super::{Coarse, Floating};
-use crate::vector::dot;
 
 /// `P`, with the factor of `G G'`.
 #[derive(Clone, Copy)]
@@ -35,19 +34,6 @@ impl Projector<'_, '_> {
         self.factor.solve(self.coarse.comm(), &mut a);
         self.coarse.add_transpose(-1.0, &a, rows);
         a
-    }
-
-    /// As [`Projector::project`] of `x`. Returns `|P x|^2` and `r'P x` for an `r = P r`, and sums over all subdomains of `width`
-    /// numbers for each own one, given and returned behind those of `x'x` and `x'r`. One all-gather.
-    pub fn project_with_sums(&self, x: &mut [f64], partial: &[f64], width: usize) -> ([f64; 2], Vec<f64>) {
-        let ([mut e, contacts, _], sums) = self.coarse.apply_each(self.coarse.base(), (x, &[]), partial, width);
-        e.iter_mut().zip(contacts).for_each(|(e, c)| *e += c);
-        let mut a = e.clone();
-        self.factor.solve(self.coarse.comm(), &mut a);
-        self.coarse.add_transpose(-1.0, &a, x);
-        // |P x|^2 = x'x - e'a with e = G x. Not `max`: NaN must stay NaN.
-        let square = sums[0] - dot(&e, &a);
-        ([if square < 0.0 { 0.0 } else { square }, sums[1]], sums[2..].to_vec())
     }
 }
 

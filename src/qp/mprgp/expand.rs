@@ -54,12 +54,7 @@ impl Mprgp<'_> {
         }
         self.share = (self.share / SHORTER).min(1.0);
         for _ in 0..TRIALS {
-            let step = self.share * line.step();
-            point.x.copy_from_slice(&self.way);
-            self.set.advance(&mut point.x, step, &self.p);
-            self.target.copy_from_slice(&self.way);
-            axpy(-step, &self.p, &mut self.target);
-            if self.arrive(hessian, b, point, statistics, least) {
+            if self.go(hessian, b, point, statistics, self.share * line.step(), least) {
                 return true;
             }
             self.share *= SHORTER;
@@ -70,15 +65,20 @@ impl Mprgp<'_> {
         false
     }
 
-    /// Makes up for what the set has cut off between `target` and x. Whether the cost is lower by `least` then.
-    pub(super) fn arrive(
+    /// Goes a step of this length along p from `way`, and makes up for what the set cuts off. Whether the cost is lower by `least` then.
+    pub(super) fn go(
         &mut self,
         hessian: &mut dyn Hessian,
         b: &[f64],
         point: &mut Point,
         statistics: &mut Statistics,
+        step: f64,
         least: f64,
     ) -> bool {
+        point.x.copy_from_slice(&self.way);
+        self.set.advance(&mut point.x, step, &self.p);
+        self.target.copy_from_slice(&self.way);
+        axpy(-step, &self.p, &mut self.target);
         hessian.enter(&self.set.face(&point.x, &self.old_gradient));
         hessian.balance(&self.target, &mut point.x);
         self.set.project(&mut point.x);

@@ -8,7 +8,7 @@
 //! cannot fail. All accepted steps lower the cost by a fixed part, at least, of what such a step is sure to do.
 
 use super::{FIXED_STEP, Hessian, Line, Mprgp, Norms, Point, Squares};
-use crate::qp::{Outcome, Statistics, axpy};
+use crate::qp::{Outcome, Statistics};
 
 /// A run ends when the model's free gradient is this part of the first.
 const RUN: f64 = 0.03;
@@ -95,15 +95,12 @@ impl Mprgp<'_> {
             point.x.copy_from_slice(&self.way);
             self.set.advance_on_tangents(&self.parts.places, &mut point.x, line.reach, &self.p);
         }
-        for ((way, x), old) in self.way.iter_mut().zip(&point.x).zip(&self.old) {
-            *way = old - x;
+        for ((p, x), old) in self.p.iter_mut().zip(&point.x).zip(&self.old) {
+            *p = old - x;
         }
+        self.way.copy_from_slice(&self.old);
         for part in std::iter::once(1.0).chain(PARTS) {
-            point.x.copy_from_slice(&self.old);
-            self.set.advance(&mut point.x, part, &self.way);
-            self.target.copy_from_slice(&self.old);
-            axpy(-part, &self.way, &mut self.target);
-            if self.arrive(hessian, b, point, statistics, least) {
+            if self.go(hessian, b, point, statistics, part, least) {
                 return;
             }
         }
