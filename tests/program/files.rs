@@ -135,7 +135,7 @@ fn sigterm_ends_a_run_that_waits_for_its_input_or_for_who_reads_its_output() {
     let cases = [vec!["solve", path], vec!["check", path], vec!["solve", &scene], summary, log];
     for (arguments, ranks) in cases.iter().zip([1, 1, 2, 1, 2]) {
         let end = run_disturbed(ranks, arguments, |process| {
-            sleep(Duration::from_secs(3));
+            sleep(Duration::from_secs(1));
             match ranks {
                 1 => send("TERM", process),
                 _ => children(process).into_iter().for_each(|rank| send("TERM", rank)),

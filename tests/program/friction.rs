@@ -263,7 +263,7 @@ fn contradictory_friction_is_refused() {
 #[test]
 fn friction_costs_few_more_applications_of_the_dual_operator() {
     let applications = |law: &str, cut: &str| {
-        let run = solve(1, "two-blocks", &[law, cut]).converged();
+        let run = solve(2, "two-blocks", &[law, cut]).converged();
         number(&run.summary(), "hessian_multiplications")
     };
     for (cut, most) in [("bricks", [2.0, 2.0, 1.6]), ("metis", [2.0, 2.5, 2.0])] {
