@@ -2,6 +2,7 @@
 
 use super::ModelError;
 use super::contacts::Contacts;
+use super::discrete::Discrete;
 use crate::comm::agree::agree;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::links::Linked;
@@ -9,7 +10,7 @@ use crate::constraint::prescribed::Prescribed;
 use crate::constraint::{Constraints, Support, dirichlet};
 use crate::contact::{ContactError, ContactPair};
 use crate::decomposition::Decomposition;
-use crate::scene::{Contact, Scene, Step};
+use crate::scene::{Contact, Moved, Scene};
 use crate::vector::dot;
 
 /// Right-hand sides of a rank's rows.
@@ -44,7 +45,7 @@ pub(super) fn constraints(
         agree(comm, "supports", outcome).map_err(ModelError::Supports)
     };
     let steps = scene.steps();
-    let at = given.prescribed(scene, Some(&steps[0]));
+    let at = given.prescribed(scene, &Moved::at_end(scene, &steps[0]));
     agreed(&at)?;
     let laws: Vec<bool> = scene.contact.iter().map(|(name, contact)| contact.rubs(name, steps)).collect();
     let constraints = Constraints::new(decomposition, supports, &contacts.pairs, linked, &at, &laws);
@@ -57,44 +58,40 @@ pub(super) fn constraints(
         let (begin, ends) = (first.clone(), vec![first; steps.len()]);
         return Ok((constraints, RightHandSides { begin, ends }));
     }
-    let right_hand_sides = |step: Option<&Step>| {
-        let at = given.prescribed(scene, step);
+    let right_hand_sides = |moved: &Moved| {
+        let at = given.prescribed(scene, moved);
         agreed(&at)?;
         refuse_held(comm, given, &constraints.idle_distances(&at))?;
         Ok::<_, ModelError>(constraints.right_hand_sides(&at))
     };
-    let begin = right_hand_sides(None)?;
+    let begin = right_hand_sides(&Moved::default())?;
     let mut ends = vec![first];
     for step in &steps[1..] {
-        ends.push(right_hand_sides(Some(step))?);
+        ends.push(right_hand_sides(&Moved::at_end(scene, step))?);
     }
     Ok((constraints, RightHandSides { begin, ends }))
 }
 
+/// Right-hand sides of a rank's rows where supports and obstacles are moved like that.
+pub fn right_hand_sides(scene: &Scene, discrete: &Discrete, moved: &Moved) -> Vec<f64> {
+    let Discrete { decomposition, supports, contacts, constraints, .. } = discrete;
+    constraints.right_hand_sides(&Given { decomposition, supports, contacts }.prescribed(scene, moved))
+}
+
 impl Given<'_> {
-    /// What is prescribed at the end of a step, or at rest without one. The gap to an obstacle changes by the obstacle's motion
+    /// What is prescribed where supports and obstacles are moved like that. The gap to an obstacle changes by the obstacle's motion
     /// along the normal.
-    fn prescribed(&self, scene: &Scene, step: Option<&Step>) -> Prescribed {
-        let of_support = |s: &Support| {
-            let factor = step.map_or(0.0, |step| step.of_support(&s.name));
-            s.displacement.map(|d| factor * d)
-        };
-        let obstacles = scene.contact.iter();
-        let obstacles: Vec<([f64; 3], f64)> = obstacles
-            .map(|(name, contact)| (contact.displacement(), step.map_or(0.0, |step| step.of_contact(name))))
-            .collect();
-        let gap = |pair: &ContactPair| {
-            let (displacement, factor) = obstacles[pair.contact];
-            pair.gap + dot(pair.normal, displacement) * factor
-        };
-        let drag = |(number, pair): (usize, &ContactPair)| {
-            let (displacement, factor) = obstacles[pair.contact];
-            (displacement != [0.0; 3]).then(|| (number, displacement.map(|d| factor * d)))
-        };
+    fn prescribed(&self, scene: &Scene, moved: &Moved) -> Prescribed {
+        let of_support = |s: &Support| moved.support.get(&s.name).copied().unwrap_or_default();
+        let of_contact = |name: &String| moved.contact.get(name).copied().unwrap_or_default();
+        let obstacles: Vec<[f64; 3]> = scene.contact.keys().map(of_contact).collect();
+        let gap = |pair: &ContactPair| pair.gap + dot(pair.normal, obstacles[pair.contact]);
+        let is_moved = |(_, pair): &(usize, &ContactPair)| obstacles[pair.contact] != [0.0; 3];
+        let moving = self.contacts.pairs.iter().filter(is_moved);
         Prescribed {
             displacements: self.supports.iter().map(of_support).collect(),
             gaps: self.contacts.pairs.iter().map(|(number, pair)| (number, gap(pair))).collect(),
-            drags: self.contacts.pairs.iter().filter_map(drag).collect(),
+            drags: moving.map(|(number, pair)| (number, obstacles[pair.contact])).collect(),
         }
     }
 }

@@ -12,6 +12,7 @@ pub mod state;
 use crate::newton::Snapshot;
 use crate::record::rows::StepRow;
 use crate::results::piece::Piece;
+use crate::scene::Moved;
 
 /// Where the solution of a scene stands between two Newton steps: all that the rest of it depends on.
 pub struct Standing {
@@ -21,4 +22,6 @@ pub struct Standing {
     pub rows: Vec<StepRow>,
     /// Their fields; no mesh.
     pub recorded: Piece,
+    /// Where supports and obstacles were at the beginning of the history; they move on from there.
+    pub moved: Moved,
 }

@@ -24,17 +24,18 @@ use crate::newton::committed::{Committed, Sizes};
 use crate::results::hdf5::SharedFile;
 use crate::results::piece::{Field, Values};
 use crate::results::vtkhdf::State;
-use crate::scene::{Initial, Scene};
+use crate::scene::{Initial, Moved, Scene};
 
 /// What the rows belong to.
 #[derive(Serialize, Deserialize)]
 struct Description {
     meshes: Vec<MeshOf>,
     sizes: Sizes,
+    moved: Moved,
 }
 
-/// The state that a problem has committed.
-pub fn pack(problem: &TornProblem, meshes: Vec<MeshOf>) -> State {
+/// The state that a problem has committed, with supports and obstacles moved like that.
+pub fn pack(problem: &TornProblem, meshes: Vec<MeshOf>, moved: Moved) -> State {
     let (mut nodes, mut points, mut histories) = (Vec::new(), Vec::new(), Vec::new());
     for (own, subdomain) in problem.subdomains.iter().enumerate() {
         let of_element = subdomain.elements.kind().points();
@@ -47,7 +48,7 @@ pub fn pack(problem: &TornProblem, meshes: Vec<MeshOf>) -> State {
             }
         }
     }
-    let description = Description { meshes, sizes: problem.committed.sizes };
+    let description = Description { meshes, sizes: problem.committed.sizes, moved };
     let mut arrays =
         vec![Field::of("nodes", 4, Values::Integer(nodes)), Field::of("point", 1, Values::Integer(points))];
     let variables = history::arrays(histories.into_iter()).into_iter();
@@ -82,6 +83,8 @@ pub struct Earlier {
     pub committed: Committed,
     /// The displacement it was reached at; zero in bodies that start from rest.
     pub u: Torn,
+    /// How far supports and obstacles of these bodies were moved then.
+    pub moved: Moved,
 }
 
 /// The state that a scene wants to start from. Collective.
@@ -110,7 +113,7 @@ fn read(
         .map_err(|_| "this is no result file: give the .vtkhdf that an earlier run wrote".to_owned())?;
     let description = file.read_text("state/description").ok();
     let description = description.and_then(|text| serde_json::from_str::<Description>(&text).ok());
-    let Some(Description { meshes: there, sizes }) = description else {
+    let Some(Description { meshes: there, sizes, moved: were }) = description else {
         return Err("it has no state to start from: solve the scene that it is of again, with this program".into());
     };
     let here = meshes(comm, scene, discrete);
@@ -144,7 +147,9 @@ fn read(
     let last = states.checked_sub(1).ok_or("it is damaged: it has fewer displacements than points")?;
     let u = places.at_nodes(&file, &nodes, (displacement, 3, last))?;
     file.close()?;
-    Ok(Earlier { committed: Committed { histories, sizes, ..Committed::default() }, u })
+    let is_taken = |name: &str| taken.iter().any(|(.., body)| here[*body].body == name);
+    let moved = were.on(scene, is_taken);
+    Ok(Earlier { committed: Committed { histories, sizes, ..Committed::default() }, u, moved })
 }
 
 /// Nodes of a body by their numbers here; `None` if the body does not take its state from the file. Those that do have the

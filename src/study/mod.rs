@@ -42,7 +42,7 @@ use crate::restart::{self, Standing};
 use crate::results::piece::Piece;
 use crate::results::provenance;
 use crate::results::vtkhdf::Records;
-use crate::scene::Scene;
+use crate::scene::{Moved, Scene};
 
 /// Why a scene has no solution; the same on every rank.
 #[derive(Debug, Error)]
@@ -73,6 +73,17 @@ pub enum Begin {
     After(Earlier),
     /// Where another one stood.
     At(Box<Standing>),
+}
+
+impl Begin {
+    /// Where supports and obstacles are then.
+    fn moved(&self) -> Moved {
+        match self {
+            Self::Rest | Self::Near(_) | Self::Around(..) => Moved::default(),
+            Self::After(earlier) => earlier.moved.clone(),
+            Self::At(standing) => standing.moved.clone(),
+        }
+    }
 }
 
 /// Who watches a solution come about; `()` does not care.
@@ -122,11 +133,15 @@ pub fn solve(
     let Discrete { decomposition, constraints, .. } = discrete;
     let connection = timer.time("interfaces", || Interconnection::new(comm, decomposition, constraints));
     let sums = timer.time("interfaces", || NodeSums::new(comm, decomposition));
-    let (conditions, stages) = model::history::stages(scene, discrete, &|| connection.gather.zeros());
+    let (mut conditions, stages) = model::history::stages(scene, discrete, &|| connection.gather.zeros());
+    let moved = begin.moved();
+    if moved != Moved::default() {
+        conditions.rhs = model::conditions::right_hand_sides(scene, discrete, &moved);
+    }
     let solver = solver::step_solver(scene, discrete, comm, &connection, &stages, timer)?;
     let mut problem = TornProblem::new(discrete, &connection, &sums, conditions);
     let goal = goal::Goal::new(scene, discrete, comm, &|| connection.gather.zeros())?;
-    let mut recorder = Recorder::new(scene, discrete, comm, goal);
+    let mut recorder = Recorder::new(scene, discrete, comm, goal, moved);
     let begin = enter(begin, &mut problem, &mut recorder);
     let settings = solver::settings(scene);
     let growing = model::history::growing(scene, discrete, &|| connection.gather.zeros());
@@ -139,15 +154,19 @@ pub fn solve(
     let rows = std::mem::take(&mut recorder.rows);
     let summary = Summary { limit_load, ..summarise(scene, discrete, newton.steps(), &failure, rows, comm) };
     let (problem, u) = newton.finish();
+    let Recorder { piece, closed, moved, .. } = recorder;
     let meshes = restart::meshes::meshes(comm, scene, discrete);
     let mesh_names = serde_json::to_string(&meshes).expect("names and numbers can be written");
     let records = Records {
         provenance: provenance::collect(comm, &scene.to_toml(), &mesh_names, &decomposition.shares, started),
         convergence: convergence(&summary.newton),
-        state: restart::state::pack(&problem, meshes),
+        state: restart::state::pack(
+            &problem,
+            meshes,
+            moved.until(scene, piece.times.last().copied().unwrap_or_default()),
+        ),
         mesh: named::arrays(comm, scene, discrete),
     };
-    let Recorder { piece, closed, .. } = recorder;
     Ok(Solved { summary, piece, records, u, closed, histories: problem.committed.histories })
 }
 
@@ -172,7 +191,7 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
             let reach = limit.map(|limit| Reach { work: Some(limit.work), factor: limit.factor, number: 1 });
             newton::Begin::Near(newton::Start { u, kept, is_origin: false, reach })
         }
-        Begin::After(Earlier { committed, u }) => {
+        Begin::After(Earlier { committed, u, .. }) => {
             let closed = ROUNDING * committed.sizes.displacement;
             let kept = problem.laws().kept_at(&problem.slack(&u), closed);
             problem.committed = committed;
@@ -180,7 +199,7 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
             newton::Begin::Near(newton::Start { u, kept, is_origin: true, reach: None })
         }
         Begin::At(standing) => {
-            let Standing { newton, rows, recorded } = *standing;
+            let Standing { newton, rows, recorded, .. } = *standing;
             recorder.resume(rows, recorded);
             newton::Begin::At(Box::new(newton))
         }
@@ -241,7 +260,7 @@ fn iterate(
         }
         let standing = || {
             let (rows, recorded) = recorder.standing();
-            Standing { newton: newton.snapshot(), rows, recorded }
+            Standing { newton: newton.snapshot(), rows, recorded, moved: recorder.moved.clone() }
         };
         if watcher.borrow_mut().stops(&standing) {
             return Err(StudyError::Stopped);

@@ -10,7 +10,7 @@ use crate::monitor::timing::Timer;
 use crate::newton::{self, Newton};
 use crate::record::rows::{GoalRow, StepRow};
 use crate::results::piece::Piece;
-use crate::scene::Scene;
+use crate::scene::{Moved, Scene};
 
 /// The increments of a history as they are reached.
 pub(super) struct Recorder<'a> {
@@ -27,14 +27,16 @@ pub(super) struct Recorder<'a> {
     pub rows: Vec<StepRow>,
     /// Contact pairs whose rows are on this rank and that press, by index.
     pub closed: Vec<u64>,
+    /// Where supports and obstacles were at the beginning.
+    pub moved: Moved,
 }
 
 impl<'a> Recorder<'a> {
     /// Nothing is reached yet.
-    pub fn new(scene: &'a Scene, discrete: &'a Discrete, comm: &'a dyn Comm, goal: Option<Goal>) -> Self {
+    pub fn new(scene: &'a Scene, discrete: &'a Discrete, comm: &'a dyn Comm, goal: Option<Goal>, moved: Moved) -> Self {
         let piece = fields::mesh(&discrete.decomposition.subdomains, comm.rank());
         let fixed = [piece.point_data.len(), piece.cell_data.len()];
-        Self { scene, discrete, comm, goal, piece, fixed, rows: Vec::new(), closed: Vec::new() }
+        Self { scene, discrete, comm, goal, piece, fixed, rows: Vec::new(), closed: Vec::new(), moved }
     }
 
     /// Goes on after increments whose rows and fields are known.

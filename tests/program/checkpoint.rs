@@ -294,9 +294,11 @@ fn a_changed_mesh_is_refused() {
 fn a_run_from_the_state_of_another_goes_on_to_the_same_bits() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
-    assert_eq!(run_disturbed(2, &solve(&at("pressed"), &COARSEST, &[]), |_| ()).code, 0);
+    // The second half of the way back depends on where the support was.
+    let moved = [&COARSEST[..], &["support.left.displacement=[0.4, 0.0, 0.0]"]].concat();
+    assert_eq!(run_disturbed(2, &solve(&at("pressed"), &moved, &[]), |_| ()).code, 0);
     let start = format!("initial.result=\"{}\"", at("pressed").join("two-blocks.vtkhdf").display());
-    let sets = [&COARSEST[..], &[&start, "step=[{amplitude=0.2}, {amplitude=1.1}]"]].concat();
+    let sets = [&moved[..], &[&start, "step=[{amplitude=0.2, increments=2}, {amplitude=1.1}]"]].concat();
     assert_eq!(run_disturbed(2, &solve(&at("whole"), &sets, &[]), |_| ()).code, 0);
     let steps = newton(&at("whole"));
     assert!(steps.len() > 5);

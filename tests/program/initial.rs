@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common::fields::{Fields, State, difference, state_at};
 use crate::common::{
-    Run, assert_near, assert_refused, assert_scene_refused, check, number, solve, solve_tightly, vector,
+    Run, assert_near, assert_refused, assert_scene_refused, check, number, scene_file, solve, solve_tightly, vector,
 };
 use fetiplast::analytic::cycle::Cycle;
 use fetiplast::material::VonMises;
@@ -115,6 +115,72 @@ fn friction_and_energies_go_on_from_the_result_of_another_run() {
             let since = energy(&whole, name) - energy(&before, name);
             let off = (energy(&summary, name) - since).abs() / energy(&before, "external");
             assert!(off < 1e-9, "{name} at {amplitude}: {} and {since}", energy(&summary, name));
+        }
+    }
+}
+
+/// A way out in one run and back in another, of an obstacle or of a body whose surface supports move: as in one history.
+#[test]
+fn what_moves_goes_on_from_where_an_earlier_run_left_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let of = |others: &str| {
+        let text = format!(
+            r#"
+            material.steel = {{ young = 210000.0, poisson = 0.3, yield_stress = 200.0, hardening = 5000.0 }}
+            [body.cube]
+            material = "steel"
+            element = "hex8"
+            brick = {{ origin = [0.0, 0.0, 0.0], size = [100.0, 100.0, 50.0], cells = [4, 4, 2] }}
+            [support.bottom]
+            surface = "cube.zmin"
+            fix = ["x", "y", "z"]
+            {others}
+            friction = 0.4
+            [decomposition]
+            cells = [2, 2, 2]
+            "#
+        );
+        scene_file(directory.path(), &text)
+    };
+    let obstacle = r#"
+        [contact.punch]
+        slave = "cube.zmax"
+        rigid = { plane = { point = [0.0, 0.0, 50.0], normal = [0.0, 0.0, -1.0] } }
+        displacement = [0.1, 0.02, -0.2]"#;
+    let plate = r#"
+        [body.plate]
+        material = "steel"
+        element = "hex8"
+        brick = { origin = [-10.0, -10.0, 50.0], size = [120.0, 120.0, 20.0], cells = [6, 6, 2] }
+        [support.plate]
+        surface = "plate.zmin"
+        fix = ["x", "y", "z"]
+        displacement = [0.1, 0.02, -0.2]
+        [contact.punch]
+        slave = "cube.zmax"
+        master = "plate.zmin""#;
+    let (out, back) = ("{increments=3}", "{amplitude=0.4, increments=2}");
+    for others in [obstacle, plate] {
+        let scene = of(others);
+        let whole = solve_tightly(2, &scene, &[&format!("step=[{out}, {back}]")]);
+        let first = solve_tightly(2, &scene, &[&format!("step=[{out}]")]);
+        let start = from(&first.result());
+        let second = solve_tightly(3, &scene, &[&format!("step=[{back}]"), &start]);
+        let states = [last(&whole.result()), last(&second.result())];
+        assert!(difference(&states[0].0, &states[1].0) < 1e-9, "displacement");
+        let slips = [&whole, &second].map(|run| {
+            let path = run.result();
+            Fields::at(&path, Fields::times(&path).map_or(0, |times| times.len() - 1)).of_points("slip")
+        });
+        let size = slips[0].iter().fold(0.0_f64, |size, slip| size.max(slip.abs()));
+        let off = slips[0].iter().zip(&slips[1]).fold(0.0_f64, |off, (a, b)| off.max((a - b).abs()));
+        assert!(size > 1e-3 && off < 1e-7 * size, "slips of {size} differ by {off}");
+        assert!(number(&second.summary(), "residual_energies") < 1e-8);
+        let [whole, first, second] = [whole, first, second].map(|run| run.summary()["energies"].clone());
+        for name in ["stored", "plastic", "friction"] {
+            let since = number(&whole, name) - number(&first, name);
+            let off = (number(&second, name) - since).abs() / number(&first, "external");
+            assert!(off < 1e-7, "{name}: {} instead of {since}", number(&second, name));
         }
     }
 }

@@ -37,6 +37,7 @@ use crate::newton::{Snapshot, SolverState, StepRecord};
 use crate::record::rows::StepRow;
 use crate::results::checkpoint::Checkpoint;
 use crate::results::piece::{Field, Piece, Values};
+use crate::scene::Moved;
 use crate::sparse::cholesky::Precision;
 
 /// The text that holds the numbers of which there are few.
@@ -66,6 +67,7 @@ struct Numbers {
     reach: Option<Reach>,
     rows: Vec<StepRow>,
     times: Vec<f64>,
+    moved: Moved,
 }
 
 /// Name, numbers a row and whether they are real, of the fields of points and of cells.
@@ -119,7 +121,7 @@ struct Arrays {
 
 /// Texts and arrays of a checkpoint. Collective.
 pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&'static str, String)>, Vec<Field>) {
-    let Standing { newton, rows, recorded } = standing;
+    let Standing { newton, rows, recorded, moved } = standing;
     let mut arrays = Packer::new(comm, discrete, &newton).arrays();
     let numbers = Numbers {
         meshes: fingerprints(comm, discrete),
@@ -138,6 +140,7 @@ pub fn pack(comm: &dyn Comm, discrete: &Discrete, standing: Standing) -> (Vec<(&
         reach: newton.reach,
         rows,
         times: recorded.times,
+        moved,
     };
     let layout = |fields: &[Field]| -> Vec<_> {
         let is_real = |field: &Field| field.states.iter().all(|state| state.real().is_some());
@@ -239,5 +242,5 @@ pub fn unpack(comm: &dyn Comm, discrete: &Discrete, file: &Checkpoint) -> Result
     };
     let Arrays { point_data, cell_data, .. } = arrays;
     let recorded = Piece { times: numbers.times, point_data, cell_data, ..Piece::default() };
-    Ok((Standing { newton, rows: numbers.rows, recorded }, is_recut))
+    Ok((Standing { newton, rows: numbers.rows, recorded, moved: numbers.moved }, is_recut))
 }
