@@ -54,6 +54,7 @@ impl Constraints {
             uneven: stiffness.least * JUMP <= stiffness.largest,
             ties,
             idle: Vec::new(),
+            guided: Vec::new(),
         };
         let mut directions = Vec::new();
         for (subdomains, key) in by_subdomains(keys, nodes) {
@@ -69,7 +70,12 @@ impl Constraints {
             for &number in clusters.get(&key).iter().flat_map(|cluster| &cluster.pairs) {
                 let pair = &pairs[number];
                 match contact::row(number, pair, &|node| sides[&node]) {
-                    Ok(row) => contact::add_tightest(contacts.entry(pair.slave).or_default(), row, at),
+                    Ok(row) => {
+                        contact::add_tightest(contacts.entry(pair.slave).or_default(), row, at);
+                        if friction[pair.contact] {
+                            result.guided.extend(friction::guided(number, pair, &|node| sides[&node]));
+                        }
+                    }
                     Err(held) => result.idle.push((number, held)),
                 }
             }

@@ -8,9 +8,9 @@
 //! scale, so that a disc of forces is a disc of multipliers. Where a node has several conditions (edges, corners) only directions
 //! have rows that are independent of all its normals: others would be held twice.
 
-use super::contact::{Side, row_along};
+use super::contact::{Side, nodes, row_along};
 use super::prescribed::Prescribed;
-use super::{Constraints, Kind, Row};
+use super::{Constraints, Fixed, Kind, Row};
 use crate::contact::ContactPair;
 use crate::contact::known::Pairs;
 use crate::vector::{cross, dot, length};
@@ -37,6 +37,19 @@ pub struct Tangent {
     pub row: usize,
     /// Unit vector along the surface.
     pub direction: [f64; 3],
+}
+
+/// A pair with friction that has less than two friction rows, as supports hold both of its sides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Guided {
+    /// Number of the pair.
+    pub pair: usize,
+    /// Unit normal of the pair.
+    pub normal: [f64; 3],
+    /// The axes that supports hold.
+    pub held: [bool; 3],
+    /// What they fix along these.
+    pub fixed: Vec<Fixed>,
 }
 
 /// A side of a pair moves along an axis if the weights of its nodes that supports leave free add up to more than this.
@@ -85,13 +98,7 @@ pub(super) fn rows<'a>(
     sides: &impl Fn(u64) -> Side<'a>,
     taken: &[[f64; 3]],
 ) -> Vec<(Row, [f64; 3])> {
-    let free = std::array::from_fn(|a| {
-        let of = |nodes: &[(u64, f64)]| -> f64 {
-            nodes.iter().filter(|(node, _)| sides(*node).1[a].is_none()).map(|(_, weight)| weight).sum()
-        };
-        of(&pair.slaves).max(of(&pair.masters)) > FREE
-    });
-    let found = directions(pair.normal, free, taken).into_iter().zip(0..);
+    let found = directions(pair.normal, free(pair, sides), taken).into_iter().zip(0..);
     let row = |(direction, axis): ([f64; 3], u8)| {
         let row = row_along(direction, Kind::Friction { pair: number, axis }, pair, sides).ok()?;
         Some((row, direction))
@@ -100,6 +107,40 @@ pub(super) fn rows<'a>(
     let scale = rows.iter().fold(f64::INFINITY, |scale, (row, _)| row.scale.min(scale));
     rows.iter_mut().for_each(|(row, _)| row.lengthen(scale / row.scale));
     rows
+}
+
+/// The axes along which supports leave a side of the pair free.
+fn free<'a>(pair: &ContactPair, sides: &impl Fn(u64) -> Side<'a>) -> [bool; 3] {
+    std::array::from_fn(|a| {
+        let of = |nodes: &[(u64, f64)]| -> f64 {
+            nodes.iter().filter(|(node, _)| sides(*node).1[a].is_none()).map(|(_, weight)| weight).sum()
+        };
+        of(&pair.slaves).max(of(&pair.masters)) > FREE
+    })
+}
+
+/// What supports hold on both sides of pair `number`, if they do along any axis.
+pub(super) fn guided<'a>(number: usize, pair: &ContactPair, sides: &impl Fn(u64) -> Side<'a>) -> Option<Guided> {
+    let held = free(pair, sides).map(|free| !free);
+    let axes = || (0..3).filter(|&axis| held[axis]);
+    let of_node = |(node, weight): (u64, f64)| {
+        let supports = sides(node).1;
+        axes().filter_map(move |axis| Some(Fixed { support: supports[axis]?, axis, weight }))
+    };
+    let fixed = nodes(pair).flat_map(of_node).collect();
+    held.contains(&true).then_some(Guided { pair: number, normal: pair.normal, held, fixed })
+}
+
+impl Guided {
+    /// How far its sides slide along each other by what moves supports and obstacles (length).
+    pub(super) fn slide(&self, at: &Prescribed) -> f64 {
+        let drag = at.drags.get(&self.pair).copied().unwrap_or_default();
+        let mut slide: [f64; 3] = std::array::from_fn(|axis| if self.held[axis] { -drag[axis] } else { 0.0 });
+        self.fixed.iter().for_each(|f| slide[f.axis] += f.weight * at.displacements[f.support][f.axis]);
+        let across = dot(slide, self.normal);
+        slide.iter_mut().zip(self.normal).for_each(|(slide, n)| *slide -= across * n);
+        length(slide)
+    }
 }
 
 impl Constraints {

@@ -195,6 +195,8 @@ pub struct Constraints {
     /// Contact pairs of own nodes without a row, as supports fix all their nodes along the normal: index of the pair and the
     /// components that they fix.
     pub idle: Vec<(usize, Vec<Fixed>)>,
+    /// Pairs of own nodes with friction whose sides supports hold along the surface, both.
+    pub guided: Vec<friction::Guided>,
 }
 
 /// Why the rows cannot be set up.

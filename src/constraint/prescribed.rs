@@ -78,6 +78,11 @@ impl Constraints {
         rhs
     }
 
+    /// Pairs of own nodes with friction along which supports hold both sides, and how far these slide by themselves (length).
+    pub fn guided_slides(&self, at: &Prescribed) -> Vec<(usize, f64)> {
+        self.guided.iter().map(|guided| (guided.pair, guided.slide(at))).collect()
+    }
+
     /// Contact pairs of own nodes without a row, and the distance that supports leave them (length).
     pub fn idle_distances(&self, at: &Prescribed) -> Vec<(usize, f64)> {
         self.idle.iter().map(|(pair, fixed)| (*pair, at.distance(*pair, fixed))).collect()

@@ -38,7 +38,7 @@ pub(super) fn constraints(
     comm: &dyn Comm,
     given: &Given,
     linked: Linked,
-) -> Result<(Constraints, RightHandSides), ModelError> {
+) -> Result<(Constraints, RightHandSides, Vec<String>), ModelError> {
     let &Given { decomposition, supports, contacts } = given;
     let agreed = |at: &Prescribed| {
         let outcome = dirichlet::check(comm, &decomposition.interface, supports, at);
@@ -51,17 +51,20 @@ pub(super) fn constraints(
     let constraints = Constraints::new(decomposition, supports, &contacts.pairs, linked, &at, &laws);
     refuse_held(comm, given, &constraints.idle_distances(&at))?;
     let first = constraints.right_hand_sides(&at);
+    let mut warned = Slides::default();
+    warned.add(comm, given, &constraints.guided_slides(&at));
 
     let displacements = supports.iter().map(|s| s.displacement);
     let mut displacements = displacements.chain(scene.contact.values().map(Contact::displacement));
     if scene.step.is_empty() || displacements.all(|displacement| displacement == [0.0; 3]) {
         let (begin, ends) = (first.clone(), vec![first; steps.len()]);
-        return Ok((constraints, RightHandSides { begin, ends }));
+        return Ok((constraints, RightHandSides { begin, ends }, warned.told(contacts)));
     }
-    let right_hand_sides = |moved: &Moved| {
+    let mut right_hand_sides = |moved: &Moved| {
         let at = given.prescribed(scene, moved);
         agreed(&at)?;
         refuse_held(comm, given, &constraints.idle_distances(&at))?;
+        warned.add(comm, given, &constraints.guided_slides(&at));
         Ok::<_, ModelError>(constraints.right_hand_sides(&at))
     };
     let begin = right_hand_sides(&Moved::default())?;
@@ -69,7 +72,34 @@ pub(super) fn constraints(
     for step in &steps[1..] {
         ends.push(right_hand_sides(&Moved::at_end(scene, step))?);
     }
-    Ok((constraints, RightHandSides { begin, ends }))
+    Ok((constraints, RightHandSides { begin, ends }, warned.told(contacts)))
+}
+
+/// Where supports and obstacles slide along each other at contacts with friction, in any step: nodes and length of each contact.
+#[derive(Default)]
+struct Slides(Vec<(usize, f64)>);
+
+impl Slides {
+    /// Adds a step, given how far the pairs of this rank slide. Collective.
+    fn add(&mut self, comm: &dyn Comm, given: &Given, slides: &[(usize, f64)]) {
+        let found = beyond(comm, given, slides);
+        self.0.resize(found.len(), (0, 0.0));
+        self.0.iter_mut().zip(found).for_each(|(most, of)| *most = (most.0.max(of.0), most.1.max(of.1)));
+    }
+
+    /// In words.
+    fn told(self, contacts: &Contacts) -> Vec<String> {
+        let of = |(name, (nodes, length)): (&String, (usize, f64))| {
+            (nodes > 0).then(|| {
+                format!(
+                    "contact.{name}: at {nodes} nodes supports hold both sides and slide along each other, by up to {length:.3e}: friction \
+                     there acts on the supports, and is not counted; where one direction is free it has all of the limit. Hold a \
+                     body where it does not touch"
+                )
+            })
+        };
+        contacts.names.iter().zip(self.0).filter_map(of).collect()
+    }
 }
 
 /// Right-hand sides of a rank's rows where supports and obstacles are moved like that.
@@ -96,38 +126,45 @@ impl Given<'_> {
     }
 }
 
-/// Overlap, in diameters of a slave node's share of the surface, that may remain where supports hold both sides.
-const HELD_OVERLAP: f64 = 1e-6;
+/// Lengths that count, in diameters of a slave node's share of the surface.
+const LEAST: f64 = 1e-6;
 
 /// Refuses contacts that supports violate, given the distances that are left on this rank, by pair. Collective.
-fn refuse_held(
+fn refuse_held(comm: &dyn Comm, given: &Given, distances: &[(usize, f64)]) -> Result<(), ContactError> {
+    let depths: Vec<(usize, f64)> = distances.iter().map(|(pair, left)| (*pair, -left)).collect();
+    let found = given.contacts.names.iter().zip(beyond(comm, given, &depths));
+    match found.into_iter().find(|(_, (nodes, _))| *nodes > 0) {
+        Some((name, (nodes, depth))) => Err(ContactError::Held { name: name.clone(), nodes, depth }),
+        None => Ok(()),
+    }
+}
+
+/// How many nodes of each contact have a length that counts, and the largest, given those on this rank, by pair. Collective.
+fn beyond(
     comm: &dyn Comm,
     &Given { decomposition, contacts: Contacts { names, pairs, .. }, .. }: &Given,
-    distances: &[(usize, f64)],
-) -> Result<(), ContactError> {
+    lengths: &[(usize, f64)],
+) -> Vec<(usize, f64)> {
     // A pair counts where its slave node has the lowest copy.
     let interface = &decomposition.interface;
     let is_first = |pair: &ContactPair| {
         let at = interface.binary_search_by_key(&pair.slave, |node| node.node);
         at.is_ok_and(|at| decomposition.own_index(interface[at].copies[0]).is_some())
     };
-    let (mut nodes, mut depths) = (vec![0_u64; names.len()], vec![0.0_f64; names.len()]);
-    for &(number, left) in distances {
-        let (pair, depth) = (&pairs[number], -left);
-        if is_first(pair) && depth > HELD_OVERLAP * pair.area.sqrt() {
+    let (mut nodes, mut largest) = (vec![0_u64; names.len()], vec![0.0_f64; names.len()]);
+    for &(number, length) in lengths {
+        let pair = &pairs[number];
+        if is_first(pair) && length > LEAST * pair.area.sqrt() {
             nodes[pair.contact] += 1;
-            depths[pair.contact] = depths[pair.contact].max(depth);
+            largest[pair.contact] = largest[pair.contact].max(length);
         }
     }
-    let mine: Vec<u64> = nodes.into_iter().zip(depths).flat_map(|(n, depth)| [n, depth.to_bits()]).collect();
+    let mine: Vec<u64> = nodes.into_iter().zip(largest).flat_map(|(n, length)| [n, length.to_bits()]).collect();
     let all = all_gather_u64(comm, &mine);
     let of = |contact: usize| all.as_chunks::<2>().0.iter().skip(contact).step_by(names.len());
-    for (contact, name) in names.iter().enumerate() {
-        let nodes = of(contact).map(|[nodes, _]| *nodes as usize).sum();
-        if nodes > 0 {
-            let depth = of(contact).fold(0.0_f64, |deepest, [_, depth]| deepest.max(f64::from_bits(*depth)));
-            return Err(ContactError::Held { name: name.clone(), nodes, depth });
-        }
-    }
-    Ok(())
+    let most = |contact: usize| {
+        let lengths = of(contact).map(|[_, length]| f64::from_bits(*length));
+        (of(contact).map(|[nodes, _]| *nodes as usize).sum(), lengths.fold(0.0, f64::max))
+    };
+    (0..names.len()).map(most).collect()
 }

@@ -106,7 +106,8 @@ pub fn discretise_meshes(
     let young: Vec<f64> = decomposition.subdomains.iter().map(|s| materials[s.material].hooke().young).collect();
     let linked = Linked::new(comm, &decomposition, &mut contacts.pairs, &young);
     let given = conditions::Given { decomposition: &decomposition, supports: &supports, contacts: &contacts };
-    let (constraints, right_hand_sides) = conditions::constraints(scene, comm, &given, linked)?;
+    let (constraints, right_hand_sides, of_slides) = conditions::constraints(scene, comm, &given, linked)?;
+    warnings.extend(of_slides);
     let surfaces = named.surfaces;
     Ok(Discrete {
         bodies,

@@ -18,10 +18,10 @@ pub(super) const FRICTION: f64 = 0.3;
 /// Makes half a width of contact of about 0.8, and friction of about half of what would make all of it slip.
 const APPROACH: f64 = 0.0215;
 const PUSHED: f64 = 0.0065;
-/// Width of cells where it touches, a tenth of the half width; half of it at level 2.
-const CELL: f64 = 0.08;
-/// Thickness of the slice of the blocks.
-const SLICE: f64 = 0.16;
+/// Width of cells where it touches, a fifth of the half width; half of it at level 2, a third at level 3.
+const CELL: f64 = 0.16;
+/// Thickness of the slice of the blocks. As thin as the cells it takes 2.5 times the applications of F.
+const SLICE: f64 = 1.0;
 
 /// Planes from zero: cells so wide where it touches, and from there on each so many times as wide as the one before.
 pub(super) fn planes(fine: usize, cell: f64, growth: f64) -> Vec<f64> {
@@ -50,7 +50,7 @@ impl Case for Cylinder {
     }
 
     fn scene(&self) -> String {
-        let (right, up) = (planes(11, CELL, 1.8), planes(5, CELL, 1.8));
+        let (right, up) = (planes(6, CELL, 1.8), planes(3, CELL, 1.8));
         let (x, z) = ([mirrored(&right), right].concat(), [mirrored(&up), vec![0.0]].concat());
         let steel = material_line("steel", &STEEL);
         format!(
@@ -84,7 +84,7 @@ impl Case for Cylinder {
 
     fn levels(&self, element: Kind) -> Vec<usize> {
         // Quadratic ones have about eight times as many nodes.
-        if element.degree() == 1 { vec![1, 2] } else { Vec::new() }
+        if element.degree() == 1 { vec![1, 2, 3] } else { Vec::new() }
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {

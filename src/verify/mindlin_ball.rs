@@ -14,8 +14,8 @@ use crate::element::Kind;
 /// Makes a circle of contact of radius 0.7, and friction of about half of what would make all of it slip.
 const APPROACH: f64 = 0.0095;
 const PUSHED: f64 = 0.00127;
-/// Width of cells where it touches; half of it at level 2.
-const CELL: f64 = 0.2;
+/// Width of cells where it touches; half of it at level 2, a third at level 3.
+const CELL: f64 = 0.4;
 
 /// The ball on its block.
 pub struct Ball;
@@ -26,7 +26,7 @@ impl Case for Ball {
     }
 
     fn scene(&self) -> String {
-        let (aside, up) = (planes(5, CELL, 3.0), planes(3, CELL, 3.0));
+        let (aside, up) = (planes(3, CELL, 3.0), planes(2, CELL, 3.0));
         let (x, z) = ([mirrored(&aside), aside.clone()].concat(), [mirrored(&up), vec![0.0]].concat());
         let steel = material_line("steel", &STEEL);
         format!(
@@ -58,7 +58,7 @@ impl Case for Ball {
 
     fn levels(&self, element: Kind) -> Vec<usize> {
         // Quadratic ones have about eight times as many nodes.
-        if element.degree() == 1 { vec![1, 2] } else { Vec::new() }
+        if element.degree() == 1 { vec![1, 2, 3] } else { Vec::new() }
     }
 
     fn errors(&self, run: &Run) -> Vec<Error> {

@@ -2,7 +2,8 @@
 
 use crate::common::fields::{Fields, state_at};
 use crate::common::{
-    assert_close, assert_near, number, run_briefly, run_misused, scene_file, solve, solve_level, solve_tightly, vector,
+    assert_close, assert_near, check, number, run_briefly, run_misused, scene_file, solve, solve_level, solve_tightly,
+    vector,
 };
 use serde_json::Value;
 
@@ -316,6 +317,26 @@ fn energies_of_a_block_that_slips_are_those_of_the_closed_form() {
     assert!(energy(&summary, "closing").abs() < 1e-8 * friction, "{}", summary["energies"]);
     assert!(energy(&summary, "plastic").abs() < 1e-8 * friction, "{}", summary["energies"]);
     assert!(number(&summary, "residual_energies") < 1e-8);
+}
+
+/// Supports that hold the slave's nodes while the obstacle moves take the friction there, and all of the limit is left for what is free.
+#[test]
+fn what_supports_slide_along_each_other_is_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let held = "\n[support.low]\nsurface = \"cube.zmin\"\nfix = [\"x\"]\n";
+    let warned = |law: &str, more: &str| {
+        let text = block("hex8", law, 0.0, 0.0) + more;
+        let run = check(2, &scene_file(directory.path(), &text), 1, &[]);
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        run.stdout.contains(
+            "contact.floor: at 15 nodes supports hold both sides and slide along each other, by up to 5.000e-1",
+        )
+    };
+    let moved = |x: f64| format!("friction = 0.3\ndisplacement = [{x:?}, 0.0, 0.0]");
+    assert!(warned(&moved(0.5), held));
+    assert!(warned(&moved(0.5), &format!("{held}[[step]]\ncontact.floor = 0.0\n[[step]]\ncontact.floor = -1.0\n")));
+    assert!(!warned(&moved(0.0), held) && !warned(&moved(0.5), ""));
+    assert!(!warned(&moved(0.5).replace("friction = 0.3", ""), held), "without friction nothing is missing");
 }
 
 /// With yielding bodies, a moving obstacle that drags, and a way back: energies balance in each increment, and on any ranks and
