@@ -52,7 +52,7 @@ pub(super) fn constraints(
     refuse_held(comm, given, &constraints.idle_distances(&at))?;
     let first = constraints.right_hand_sides(&at);
     let mut warned = Slides::default();
-    warned.add(comm, given, &constraints.guided_slides(&at));
+    warned.add(comm, given, &constraints, &at);
 
     let displacements = supports.iter().map(|s| s.displacement);
     let mut displacements = displacements.chain(scene.contact.values().map(Contact::displacement));
@@ -64,7 +64,7 @@ pub(super) fn constraints(
         let at = given.prescribed(scene, moved);
         agreed(&at)?;
         refuse_held(comm, given, &constraints.idle_distances(&at))?;
-        warned.add(comm, given, &constraints.guided_slides(&at));
+        warned.add(comm, given, &constraints, &at);
         Ok::<_, ModelError>(constraints.right_hand_sides(&at))
     };
     let begin = right_hand_sides(&Moved::default())?;
@@ -80,9 +80,12 @@ pub(super) fn constraints(
 struct Slides(Vec<(usize, f64)>);
 
 impl Slides {
-    /// Adds a step, given how far the pairs of this rank slide. Collective.
-    fn add(&mut self, comm: &dyn Comm, given: &Given, slides: &[(usize, f64)]) {
-        let found = beyond(comm, given, slides);
+    /// Adds what is prescribed at the end of a step. Collective.
+    fn add(&mut self, comm: &dyn Comm, given: &Given, constraints: &Constraints, at: &Prescribed) {
+        if !constraints.has_friction {
+            return;
+        }
+        let found = beyond(comm, given, &constraints.guided_slides(at));
         self.0.resize(found.len(), (0, 0.0));
         self.0.iter_mut().zip(found).for_each(|(most, of)| *most = (most.0.max(of.0), most.1.max(of.1)));
     }

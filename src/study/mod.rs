@@ -258,10 +258,7 @@ fn iterate(
         if let Some(outcome) = newton.outcome() {
             break outcome.clone();
         }
-        let standing = || {
-            let (rows, recorded) = recorder.standing();
-            Standing { newton: newton.snapshot(), rows, recorded, moved: recorder.moved.clone() }
-        };
+        let standing = || recorder.standing(newton.snapshot());
         if watcher.borrow_mut().stops(&standing) {
             return Err(StudyError::Stopped);
         }

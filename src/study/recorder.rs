@@ -7,8 +7,9 @@ use crate::decomposition::Subdomain;
 use crate::estimate::bregman;
 use crate::model::Discrete;
 use crate::monitor::timing::Timer;
-use crate::newton::{self, Newton};
+use crate::newton::{self, Newton, Snapshot};
 use crate::record::rows::{GoalRow, StepRow};
+use crate::restart::Standing;
 use crate::results::piece::Piece;
 use crate::scene::{Moved, Scene};
 
@@ -47,11 +48,12 @@ impl<'a> Recorder<'a> {
         self.piece.cell_data.extend(cell_data);
     }
 
-    /// The rows, and the fields without the mesh.
-    pub fn standing(&self) -> (Vec<StepRow>, Piece) {
+    /// What it takes to go on from here; of the fields all but the mesh.
+    pub fn standing(&self, newton: Snapshot) -> Standing {
         let Piece { times, point_data, cell_data, .. } = &self.piece;
         let (point_data, cell_data) = (point_data[self.fixed[0]..].to_vec(), cell_data[self.fixed[1]..].to_vec());
-        (self.rows.clone(), Piece { times: times.clone(), point_data, cell_data, ..Piece::default() })
+        let recorded = Piece { times: times.clone(), point_data, cell_data, ..Piece::default() };
+        Standing { newton, rows: self.rows.clone(), recorded, moved: self.moved.clone() }
     }
 
     /// Takes down where an iteration ended. Collective.

@@ -27,7 +27,12 @@ fn from(result: &Path) -> String {
 
 /// The last state of a file.
 fn last(path: &Path) -> State {
-    state_at(path, Fields::times(path).map_or(0, |times| times.len() - 1))
+    state_at(path, last_time(path))
+}
+
+/// Which of its times is the last.
+fn last_time(path: &Path) -> usize {
+    Fields::times(path).map_or(0, |times| times.len() - 1)
 }
 
 /// Pressed in one run and released in another, cut otherwise: as in one history, for every element.
@@ -170,7 +175,7 @@ fn what_moves_goes_on_from_where_an_earlier_run_left_it() {
         assert!(difference(&states[0].0, &states[1].0) < 1e-9, "displacement");
         let slips = [&whole, &second].map(|run| {
             let path = run.result();
-            Fields::at(&path, Fields::times(&path).map_or(0, |times| times.len() - 1)).of_points("slip")
+            Fields::at(&path, last_time(&path)).of_points("slip")
         });
         let size = slips[0].iter().fold(0.0_f64, |size, slip| size.max(slip.abs()));
         let off = slips[0].iter().zip(&slips[1]).fold(0.0_f64, |off, (a, b)| off.max((a - b).abs()));
