@@ -19,6 +19,8 @@ const SHARE: f64 = 0.5;
 const FLOOR: f64 = 0.5;
 /// What the floor is lowered by beyond the ratio of wanted to true residual.
 const MARGIN: f64 = 0.3;
+/// How many times the error of the subdomains' own problems may be of what it is estimated to be.
+const LOCAL: f64 = 10.0;
 
 /// Accuracy of a quadratic program.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,12 +42,13 @@ impl Default for Forcing {
 
 impl Forcing {
     /// For the step after one that brought the true residual from `before` to `after`, where `wanted` is enough in the
-    /// end. `at_floor` says that the program was solved to the floor.
-    pub fn update(&mut self, before: f64, after: f64, wanted: f64, at_floor: bool) {
+    /// end. `at_floor` says that the program was solved to the floor; the subdomains' own problems were solved up to `local`,
+    /// relative, which is not for a program to mend.
+    pub fn update(&mut self, (before, after): (f64, f64), wanted: f64, (at_floor, local): (bool, f64)) {
         let ratio = after / before;
         self.left = (wanted / after).min(LOOSEST);
         self.drop = (SHARE * ratio * ratio).clamp(TIGHTEST, LOOSEST);
-        if at_floor && after > wanted {
+        if at_floor && after > wanted.max(LOCAL * local * before) {
             self.floor *= (MARGIN * wanted / after).max(TIGHTEST);
         }
     }
@@ -65,12 +68,21 @@ mod tests {
     #[test]
     fn accuracy_follows_the_residual() {
         let mut forcing = Forcing::default();
-        forcing.update(1.0, 0.5, 1e-6, false);
+        forcing.update((1.0, 0.5), 1e-6, (false, 0.0));
         assert_eq!(forcing, Forcing { drop: LOOSEST, floor: FLOOR, left: 2e-6 });
-        forcing.update(0.5, 0.05, 1e-6, false);
+        forcing.update((0.5, 0.05), 1e-6, (false, 0.0));
         assert!((forcing.drop - SHARE * 0.01).abs() < 1e-15);
-        forcing.update(0.05, 1e-5, 1e-6, true);
+        forcing.update((0.05, 1e-5), 1e-6, (true, 0.0));
         assert_eq!((forcing.drop, forcing.left), (TIGHTEST, LOOSEST));
         assert!((forcing.floor - FLOOR * 0.1 * MARGIN).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_the_subdomains_left_does_not_lower_the_floor() {
+        let mut forcing = Forcing::default();
+        forcing.update((1e-4, 1e-9), 1e-11, (true, 1e-6));
+        assert_eq!(forcing.floor, FLOOR);
+        forcing.update((1e-4, 1e-8), 1e-11, (true, 1e-6));
+        assert!(forcing.floor < FLOOR);
     }
 }

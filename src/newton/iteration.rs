@@ -111,7 +111,9 @@ impl<'a> Newton<'a> {
             (problem.loads, problem.firm) = (control.loads(), firm(&problem.materials));
         }
         let (iterate, outcome) = iterate::first(&problem, &mut solver, (u, lambda), kept, stood, timer);
-        let admissible = before < steps.len() || problem.is_admissible(&iterate.u);
+        // A limit load's equilibria but the first begin at displacements that are made admissible.
+        let was_made = before < steps.len() || (control.is_some() && !steps.is_empty());
+        let admissible = was_made || problem.is_admissible(&iterate.u);
         Self {
             problem,
             solver,
@@ -292,7 +294,8 @@ impl<'a> Newton<'a> {
         let before = iterate.residuals.largest();
         let residuals = || problem.residuals(&iterate.u, &iterate.state, &iterate.lambda);
         iterate.residuals = timer.time("residuals", residuals);
-        self.forcing.update(before, iterate.residuals.largest(), self.settings.residual, step.at_floor);
+        let way = (before, iterate.residuals.largest());
+        self.forcing.update(way, self.settings.residual, (step.at_floor, step.local_residual));
         left
     }
 

@@ -19,7 +19,7 @@ use crate::qp::slides::{Disc, Slides};
 use crate::qp::{Limits, Outcome, Statistics, active_set, power};
 use crate::scene::Qp;
 
-/// Of a residual its projection cannot tell more than this share.
+/// Of a residual its projection cannot tell more than this share, and surely less than a tenth of it.
 const ROUNDING: f64 = 1e-14;
 
 /// How to solve the programs.
@@ -159,7 +159,7 @@ impl Programs {
         let limits = Limits {
             relative: self.settings.tolerance * forcing.floor,
             reference: self.reference,
-            absolute: if is_strained { 0.0 } else { rounding },
+            absolute: if is_strained { 0.1 * rounding } else { rounding },
             drop: forcing.drop,
             products: self.settings.products.saturating_sub(from.spent),
         };
