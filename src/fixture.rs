@@ -16,6 +16,7 @@ use crate::feti::dual::hybrid::Hybrid;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::{Factors, analyse};
+use crate::feti::inverse::pins::Pins;
 use crate::feti::inverse::tangents::Linearisation;
 use crate::material::Material;
 use crate::model;
@@ -204,7 +205,7 @@ impl<'a> Setup<'a> {
         let mut stiffnesses = Vec::new();
         for (own, subdomain) in self.subdomains().iter().enumerate() {
             let values = elastic(subdomain, self.material(own), &factors.symbolic(own).pattern);
-            factors.factorise(own, subdomain, &values, &[], false).expect("elastic bodies are stiff");
+            factors.factorise(own, subdomain, &values, &Pins::none(), false).expect("elastic bodies are stiff");
             stiffnesses.push(values);
         }
         (factors, stiffnesses)
@@ -216,7 +217,7 @@ impl<'a> Setup<'a> {
         let hybrid = Hybrid::of_clusters(&self.connection, decomposition, constraints).expect("clusters are firm");
         let (count, timer) = (self.subdomains().len(), Timer::start());
         let symbolic = analyse(self.subdomains());
-        let inverse = Inverse::new(symbolic, Precision::Double, vec![None; count], vec![Vec::new(); count]);
+        let inverse = Inverse::new(symbolic, Precision::Double, vec![None; count], None);
         let mut operator = DualOperator::new(inverse, hybrid, &self.gather);
         let region =
             |subdomain| Region { subdomain, material: &self.discrete.materials[subdomain.material], history: &[] };

@@ -17,7 +17,7 @@
 //!
 //! where every term is positive and is computed without cancellation, and where `K_s` may be any tangent, as tangents are at
 //! most `K_e` and so `K_e^+` is at most `K_s^+` on forces in balance. (Where supports hold a subdomain still,
-//! [`crate::feti::inverse::pinnable`], `w` is taken among those that they allow, which gives no less.) We start from `v = u`, where only the first and the last
+//! [`crate::feti::inverse::pins`], `w` is taken among those that they allow, which gives no less.) We start from `v = u`, where only the first and the last
 //! are not zero, and let `v = v + K^+ rho`: Newton's method for the torn bodies under the forces `lambda`, whose `rho` vanishes
 //! quadratically, so that the gap tends to the true duality gap of `u` and `lambda`. In linear elasticity (`r = 1`, `K = K_e`)
 //! the first value is that already. Each turn costs one `K^+` and no conjugate gradients; there are four at most, and the least

@@ -8,7 +8,7 @@ use crate::feti::dual::hybrid::Hybrid;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::analyse;
-use crate::feti::inverse::pinnable;
+use crate::feti::inverse::pins::Pins;
 use crate::feti::inverse::schur::Schur;
 use crate::feti::preconditioner::Preconditioner;
 use crate::model::history::Stage;
@@ -54,9 +54,11 @@ pub(super) fn step_solver<'a>(
         schur.map(|schur| timer.time("interfaces", || Preconditioner::new(connection, constraints, schur)));
     timer.time("coarse set-up", || model::held::at_all_stages(scene, discrete, &mut coarse, space, modes, stages))?;
     let hybrid = timer.time("clusters", || Hybrid::of_clusters(connection, decomposition, constraints))?;
-    let pinnable = timer.time("symbolic analysis", || pinnable::unknowns(constraints, subdomains, modes));
+    let pins = timer.time("symbolic analysis", || Pins::of_supports(constraints, subdomains));
+    let has_pins = space.counts([pins.iter().filter(|pins| !pins.unknowns.is_empty()).count() as u64]) != [0];
+    let pins = (has_pins && hybrid.is_none()).then_some(pins);
     let twins = timer.time("symbolic analysis", || twins(comm, subdomains));
-    let inverse = Inverse::new(symbolic, precision, twins, pinnable);
+    let inverse = Inverse::new(symbolic, precision, twins, pins);
     let operator = DualOperator::new(inverse, hybrid, gather);
     Ok(StepSolver::new(operator, coarse, preconditioner, programs(scene)))
 }

@@ -226,7 +226,7 @@ fn a_history_beyond_the_limit_load_ends_just_below_it() {
 
 #[test]
 fn without_a_state_that_converged_the_last_attempt_is_shown() {
-    let run = solve(RANKS, "bar", &["solver.newton_limit=1", "step=[{halvings=2}, {amplitude=0}]"]);
+    let run = solve(RANKS, "bar", &["solver.newton_limit=1", "step=[{halvings=2, amplitude=4}, {amplitude=0}]"]);
     assert_eq!(run.code, 1, "{}", run.stderr);
     let summary = run.summary();
     assert_eq!(summary["steps"].as_array().unwrap().len(), 1);

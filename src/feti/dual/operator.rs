@@ -86,13 +86,12 @@ impl<'a> DualOperator<'a> {
     pub fn strengthen(
         &mut self,
         subdomains: &[Subdomain],
-        (beside, is_any_weak): (&[usize], bool),
+        beside: &[usize],
         interiors: &mut Schur,
         space: &RowSpace,
         timer: &Timer,
     ) -> Result<(), NotDefinite> {
-        let pins = is_any_weak && self.hybrid.is_none();
-        agree(self.inverse.strengthen(subdomains, beside, pins, interiors, timer), space)
+        agree(self.inverse.strengthen(subdomains, beside, interiors, timer), space)
     }
 
     /// Adds to multipliers, which balance each cluster, what balances each of its members: the forces by which these held each

@@ -1,4 +1,4 @@
-//! Supports of subdomains whose supported unknowns are pinned ([`crate::feti::inverse::pinnable`]): how far they move, and what
+//! Supports of subdomains whose supported unknowns are pinned ([`crate::feti::inverse::pins`]): how far they move, and what
 //! they carry.
 //!
 //! The factor of such a subdomain keeps these unknowns at zero. Prescribed displacements there are a lift `w` that is known, and the

@@ -1,14 +1,17 @@
 //! `K^+`: a generalised inverse of each subdomain's singular stiffness matrix by plain sparse Cholesky.
 //!
 //! With `Q` the orthogonal projector onto the rigid modes restricted to a few well-spread fixing nodes, `K + rho Q` is
-//! positive definite and its inverse is a generalised inverse of `K` (Brzobohaty, Kozubek, Markopoulos, Dostal 2011).
+//! positive definite and its inverse is a generalised inverse of `K` (Brzobohaty, Kozubek, Markopoulos, Dostal 2011). Where
+//! supports pin unknowns ([`Pins`]), `K` has no entries that join these with others, and `Q` is of the motions that are left.
 //! No null pivots are sought. Symbolic analysis is done once and shared by subdomains of equal connectivity.
 
 use std::rc::Rc;
 
+use faer::Mat;
 use thiserror::Error;
 
 use super::kernel::RigidModes;
+use super::pins::Pins;
 use super::stock::{Batch, Stock};
 use crate::decomposition::Subdomain;
 use crate::feti::Torn;
@@ -96,8 +99,8 @@ pub struct Factors {
     /// A number for each own subdomain; factors with the same number are the same.
     stamps: Vec<u64>,
     made: u64,
-    /// Unknowns of each own subdomain that its factor keeps at zero.
-    pinned: Vec<Vec<u32>>,
+    /// What the factor of each own subdomain keeps at zero.
+    pins: Vec<Pins>,
 }
 
 impl Factors {
@@ -105,8 +108,8 @@ impl Factors {
     pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
         let factors = Stock::new(symbolic.iter().map(|s| s.cholesky.factor(precision)));
-        let (stamps, pinned) = (vec![0; symbolic.len()], vec![Vec::new(); symbolic.len()]);
-        Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0, pinned }
+        let (stamps, pins) = (vec![0; symbolic.len()], vec![Pins::none(); symbolic.len()]);
+        Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0, pins }
     }
 
     /// Symbolic analysis of an own subdomain.
@@ -125,8 +128,7 @@ impl Factors {
     }
 
     /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`; `common` says that it has twins, here
-    /// or on other ranks. If some unknowns are to be `pinned` at zero, ascending, factorises the rest of `K` instead: they must
-    /// leave no rigid motion free, see [`super::pinnable`].
+    /// or on other ranks. The unknowns of `pins` are kept at zero, and `Q` is of the rigid motions that they leave free.
     ///
     /// # Errors
     /// If the matrix is not positive definite, or not finite.
@@ -135,7 +137,7 @@ impl Factors {
         own: usize,
         subdomain: &Subdomain,
         stiffness: &[f64],
-        pinned: &[u32],
+        pins: &Pins,
         common: bool,
     ) -> Result<(), NotDefinite> {
         let Symbolic { pattern, fixing, cholesky, .. } = &*self.symbolic[own];
@@ -144,12 +146,11 @@ impl Factors {
         self.shifted.extend_from_slice(stiffness);
         let diagonal = pattern.diagonal(stiffness);
         let rho = diagonal.iter().sum::<f64>() / n as f64;
-        if pinned.is_empty() {
-            add_fixing(pattern, fixing, &subdomain.shape, rho, &mut self.shifted);
-        } else {
-            pattern.uncouple(pinned, &mut self.shifted);
+        if !pins.unknowns.is_empty() {
+            pattern.uncouple(&pins.unknowns, &mut self.shifted);
         }
-        self.pinned[own] = pinned.to_vec();
+        add_fixing(pattern, fixing, (&subdomain.shape, pins), rho, &mut self.shifted);
+        self.pins[own].clone_from(pins);
         let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
         if !rho.is_finite() {
             return Err(refuse(0));
@@ -180,13 +181,13 @@ impl Factors {
 
     /// Unknowns of an own subdomain that its factor keeps at zero, ascending.
     pub fn pinned(&self, own: usize) -> &[u32] {
-        &self.pinned[own]
+        &self.pins[own].unknowns
     }
 
     /// From now on an own subdomain has the factor of a congruent one with equal stiffness.
     pub fn share(&mut self, own: usize, twin: usize) {
         self.factors.share(own, twin, true);
-        self.pinned[own].clear();
+        self.pins[own] = self.pins[twin].clone();
         self.stamps[own] = self.stamps[twin];
     }
 
@@ -218,7 +219,7 @@ impl Factors {
         for batch in self.factors.batches() {
             match batch {
                 &Batch::Alone(own) => {
-                    self.pinned[own].iter().for_each(|&dof| x[own][dof as usize] = 0.0);
+                    self.pins[own].unknowns.iter().for_each(|&dof| x[own][dof as usize] = 0.0);
                     self.workspace.solve(&self.symbolic[own].cholesky, self.factors.of(own), &mut x[own]);
                 }
                 Batch::Twins(twins) => {
@@ -227,6 +228,7 @@ impl Factors {
                     for (lane, &own) in twins.iter().enumerate() {
                         panel.iter_mut().zip(&x[own]).for_each(|(panel, x)| panel[lane] = *x);
                     }
+                    self.pins[first].unknowns.iter().for_each(|&dof| panel[dof as usize] = [0.0; WIDTH]);
                     let cholesky = &self.symbolic[first].cholesky;
                     self.workspace.solve_wide(cholesky, self.factors.of(first), panel.as_flattened_mut(), twins.len());
                     for (lane, &own) in twins.iter().enumerate() {
@@ -248,19 +250,35 @@ fn passes_probe(pattern: &Pattern, values: &[f64], solve: impl FnOnce(&mut [f64]
     x.iter().zip(&probe).all(|(x, p)| (x - p).abs() <= PROBE * p)
 }
 
-/// Adds `rho Q` of the fixing nodes to the lower values of the stiffness.
-fn add_fixing(pattern: &Pattern, fixing: &[u32], points: &[[f64; 3]], rho: f64, values: &mut [f64]) {
-    let corners: Vec<[f64; 3]> = fixing.iter().map(|&n| points[n as usize]).collect();
-    let modes = RigidModes::new(&corners);
-    let at: Vec<_> = corners.iter().map(|&point| modes.at(point)).collect();
+/// Adds `rho Q` of the fixing nodes to the lower values of the stiffness: of the rigid motions that pins leave free.
+fn add_fixing(pattern: &Pattern, fixing: &[u32], (points, pins): (&[[f64; 3]], &Pins), rho: f64, values: &mut [f64]) {
+    let at = motions(fixing, points, pins);
     for (a, &row) in fixing.iter().enumerate() {
         for (b, &column) in fixing.iter().enumerate().filter(|&(_, &column)| column <= row) {
-            let block = std::array::from_fn(|i| {
-                std::array::from_fn(|j| rho * (0..6).map(|k| at[a][i][k] * at[b][j][k]).sum::<f64>())
-            });
+            let product = |i: usize, j: usize| at[a][i].iter().zip(&at[b][j]).map(|(p, q)| p * q).sum::<f64>();
+            let block = std::array::from_fn(|i| std::array::from_fn(|j| rho * product(i, j)));
             pattern.add_block(values, row, column, &block);
         }
     }
+}
+
+/// The rigid motions that pins leave free at the fixing nodes, `[node][component][motion]`, orthonormal there.
+fn motions(fixing: &[u32], points: &[[f64; 3]], pins: &Pins) -> Vec<[Vec<f64>; 3]> {
+    let corners: Vec<[f64; 3]> = fixing.iter().map(|&n| points[n as usize]).collect();
+    if pins.unknowns.is_empty() {
+        let modes = RigidModes::new(&corners);
+        return corners.iter().map(|&point| modes.at(point).map(Vec::from)).collect();
+    }
+    let modes = RigidModes::new(points);
+    let at: Vec<_> = corners.iter().map(|&point| modes.at(point)).collect();
+    let motion = |row: usize, of: usize| at[row / 3][row % 3].iter().zip(&pins.free[of]).map(|(m, a)| m * a).sum();
+    let basis = Mat::<f64>::from_fn(3 * corners.len(), pins.free.len(), motion).qr().compute_thin_Q();
+    let components = |node: usize, axis: usize| {
+        // Rounding must not join pinned unknowns with others.
+        let is_pinned = pins.unknowns.binary_search(&(3 * fixing[node] + axis as u32)).is_ok();
+        (0..pins.free.len()).map(|k| if is_pinned { 0.0 } else { basis[(3 * node + axis, k)] }).collect()
+    };
+    (0..corners.len()).map(|node| std::array::from_fn(|axis| components(node, axis))).collect()
 }
 
 /// Well-spread nodes: each the farthest from those before it, the first the farthest from the centroid. Round-off does

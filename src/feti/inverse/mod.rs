@@ -3,15 +3,15 @@
 //! [`Inverse`] is the whole: set up in [`Inverse::new`], given its numbers by [`Inverse::update`], applied by [`Inverse::solve`].
 //! [`kernel`] has the rigid modes, [`factor`] the factors of whole subdomains, [`schur`] those of their interiors with the Schur
 //! complement, [`stock`] the scratch that their solves share. [`tangents`] decides which factors are kept, shared or made
-//! again, from the states that they were made from ([`basis`]). [`refine`] recovers the digits that they lack. [`pinnable`] finds unknowns
-//! that factors may keep at zero.
+//! again, from the states that they were made from ([`basis`]). [`refine`] recovers the digits that they lack. [`pins`] finds unknowns
+//! that factors keep at zero.
 //!
 //! All here is local to a rank.
 
 pub mod basis;
 pub mod factor;
 pub mod kernel;
-pub mod pinnable;
+pub mod pins;
 pub mod refine;
 pub mod schur;
 pub mod stock;
@@ -21,6 +21,7 @@ use std::rc::Rc;
 
 use self::basis::Bases;
 use self::factor::{Factors, NotDefinite, Symbolic};
+use self::pins::Pins;
 use self::schur::Schur;
 use self::tangents::{Factorising, Linearisation, Tangents};
 use super::Torn;
@@ -33,24 +34,23 @@ use crate::sparse::cholesky::Precision;
 pub struct Inverse {
     factors: Factors,
     tangents: Tangents,
-    /// For each own subdomain, unknowns that its factor may keep at zero ([`pinnable`]).
-    pinnable: Vec<Vec<u32>>,
-    /// Whether the factor of any subdomain, on any rank, may keep unknowns at zero now.
+    /// Whether the factor of any subdomain, on any rank, keeps unknowns at zero.
     pins: bool,
 }
 
 impl Inverse {
     /// Of subdomains with these analyses. Factors are in single `precision` where a probe lets
-    /// them. `twins` numbers subdomains that have congruent ones; of `pinnable` see [`pinnable::unknowns`]. Nothing is factorised
-    /// before [`Inverse::update`].
+    /// them. `twins` numbers subdomains that have congruent ones. Of the pins of each subdomain see [`Pins::of_supports`]; `None`
+    /// on all ranks if there are to be none. Nothing is factorised before [`Inverse::update`].
     pub fn new(
         symbolic: Vec<Rc<Symbolic>>,
         precision: Precision,
         twins: Vec<Option<usize>>,
-        pinnable: Vec<Vec<u32>>,
+        pins: Option<Vec<Pins>>,
     ) -> Self {
-        let (factors, tangents) = (Factors::new(symbolic, precision), Tangents::new(twins));
-        Self { factors, tangents, pinnable, pins: false }
+        let has_pins = pins.is_some();
+        let pins = pins.unwrap_or_else(|| vec![Pins::none(); twins.len()]);
+        Self { factors: Factors::new(symbolic, precision), tangents: Tangents::new(twins, pins), pins: has_pins }
     }
 
     /// Assembles the tangents `K_k` at an iterate and factorises those whose entries changed by more than `left`, relative to
@@ -65,7 +65,6 @@ impl Inverse {
         interiors: Option<&mut Schur>,
         timer: &Timer,
     ) -> Result<Vec<bool>, NotDefinite> {
-        self.pins = false;
         self.tangents.update(at, left, &mut Factorising { factors: &mut self.factors, schur: interiors, timer })
     }
 
@@ -85,9 +84,7 @@ impl Inverse {
         self.tangents.remake(regions, bases, &mut on)
     }
 
-    /// For some weak subdomain on any rank ([`Schur::is_weak`]): gives the preconditioner the `interiors` of own subdomains
-    /// `beside` weak ones as they are now, and pins what supports hold of weak own ones. With `is_any_weak` false nothing is pinned
-    /// any more.
+    /// Gives the preconditioner the `interiors` of own subdomains `beside` weak ones ([`Schur::is_weak`]) as they are now.
     ///
     /// # Errors
     /// The first block that is singular.
@@ -95,21 +92,11 @@ impl Inverse {
         &mut self,
         subdomains: &[Subdomain],
         beside: &[usize],
-        is_any_weak: bool,
         interiors: &mut Schur,
         timer: &Timer,
     ) -> Result<(), NotDefinite> {
-        self.pins = is_any_weak;
-        let pinned: Vec<bool> = (0..subdomains.len()).map(|own| self.pins && interiors.is_weak(own)).collect();
         let mut on = Factorising { factors: &mut self.factors, schur: Some(interiors), timer };
-        for &own in beside {
-            self.tangents.follow(own, subdomains[own].id, &mut on)?;
-        }
-        for (own, subdomain) in subdomains.iter().enumerate() {
-            let unknowns = if pinned[own] { &self.pinnable[own][..] } else { &[] };
-            self.tangents.pin(own, subdomain, unknowns, &mut on)?;
-        }
-        Ok(())
+        beside.iter().try_for_each(|&own| self.tangents.follow(own, subdomains[own].id, &mut on))
     }
 
     /// Another solve follows, from what is committed now.
@@ -140,7 +127,7 @@ impl Inverse {
         refine::refine(&mut self.factors, &self.tangents.values, norm, at, share)
     }
 
-    /// Whether unknowns of any subdomain, on any rank, may be kept at zero now.
+    /// Whether unknowns of any subdomain, on any rank, are kept at zero.
     pub fn pins(&self) -> bool {
         self.pins
     }

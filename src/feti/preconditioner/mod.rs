@@ -91,7 +91,7 @@ impl<'a> Preconditioner<'a> {
         }
         timer.time("faces", || self.deluxe.meet(changes));
         let beside: Vec<usize> = (0..subdomains.len()).filter(|&own| self.deluxe.is_beside(own)).collect();
-        operator.strengthen(subdomains, (&beside, changes.is_any_weak), &mut self.schur, space, timer)?;
+        operator.strengthen(subdomains, &beside, &mut self.schur, space, timer)?;
         let stiffness = |own: usize| operator.inverse.stiffness(own);
         timer.time("faces", || self.deluxe.update(&self.schur, stiffness));
         Ok(())

@@ -121,7 +121,7 @@ fn assert_alike(found: &(Summary, Piece), expected: &(Summary, Piece), what: &st
         let alike = (a - b).abs() <= EXACT * size || (a.is_nan() && b.is_nan());
         assert!(alike, "{what}: {a} instead of {b}, of {size}");
     };
-    assert_eq!(found.0.steps.len(), expected.0.steps.len());
+    assert_eq!(found.0.steps.len(), expected.0.steps.len(), "{what}");
     for (a, b) in found.0.steps.iter().zip(&expected.0.steps) {
         let (a, b) = (&a.state, &b.state);
         assert_eq!((a.plastic_elements, a.active_contacts), (b.plastic_elements, b.active_contacts), "{what}");
