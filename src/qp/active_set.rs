@@ -27,6 +27,8 @@ use super::{Limits, Outcome, Statistics, axpy};
 const SETS: usize = 60;
 /// How often directions and radii of discs are followed at most.
 const FOLLOWS: usize = 100;
+/// What slides by less than this share of the residual may slide the other way.
+const DOUBT: f64 = 0.2;
 /// A move of x smaller than this, relative to x, is rounding.
 const ROUNDING: f64 = 1e-13;
 
@@ -234,7 +236,7 @@ impl Run<'_> {
             let changes = self.space.dot(&self.work, &self.work);
             return if changes > 0.0 { Correction::Set(changes) } else { Correction::None };
         }
-        let next = self.slides.next(&self.x, &moved, tolerance);
+        let next = self.slides.next(&self.x, &moved, [tolerance, tolerance.max(DOUBT * norm)]);
         let [mut fixed, mut hung] = [(); 2].map(|()| vec![0.0; self.x.len()]);
         self.slides.compare(&next, &self.x, [&mut self.work, &mut fixed, &mut hung]);
         let d = self.space.dots(&[(&self.work, &self.work), (&fixed, &fixed), (&hung, &hung)]);

@@ -106,8 +106,8 @@ impl Disc {
         constant + factor * f64::max(0.0, x[self.normal])
     }
 
-    /// What the unknowns and what slides tell of it. A change between sticking and slipping takes more than `tolerance` of what slides.
-    fn judge(&self, state: Slide, x: &[f64], v: &[f64], tolerance: f64) -> Slide {
+    /// What the unknowns and what slides tell of it, see [`Slides::next`].
+    fn judge(&self, state: Slide, x: &[f64], v: &[f64], [tolerance, doubt]: [f64; 2]) -> Slide {
         let radius = self.radius(x);
         if radius <= NOTHING * tolerance / self.flexibility {
             return Slide::Open;
@@ -118,7 +118,7 @@ impl Disc {
         let margin = tolerance / self.flexibility;
         let slips = match state {
             // The other border is far: what slides against its friction sticks first.
-            Slide::Slip { direction, .. } if s * direction[0] + t * direction[1] < -tolerance => false,
+            Slide::Slip { direction, .. } if s * direction[0] + t * direction[1] < -doubt => false,
             Slide::Slip { .. } => size > radius * (1.0 - ROUNDING) - margin,
             Slide::Open => size > radius,
             Slide::Stick => size > radius * (1.0 + ROUNDING) + margin,
@@ -140,7 +140,7 @@ impl Slides {
 
     /// Discs as unknowns `x` and what slides, `v`, tell.
     pub fn told(discs: Vec<Disc>, x: &[f64], v: &[f64]) -> Self {
-        let states = discs.iter().map(|disc| disc.judge(Slide::Open, x, v, 0.0)).collect();
+        let states = discs.iter().map(|disc| disc.judge(Slide::Open, x, v, [0.0; 2])).collect();
         Self { discs, states }
     }
 
@@ -321,9 +321,10 @@ impl Slides {
     }
 
     /// The states that the unknowns and what slides, `v`, tell. A change between sticking and slipping takes more than `tolerance` of
-    /// what slides.
-    pub fn next(&self, x: &[f64], v: &[f64], tolerance: f64) -> Vec<Slide> {
-        self.iter().map(|(disc, state)| disc.judge(state, x, v, tolerance)).collect()
+    /// what slides, and more than `doubt` where it slides against its friction: what sticks by mistake comes loose again from its
+    /// border only, one row of nodes with each set.
+    pub fn next(&self, x: &[f64], v: &[f64], [tolerance, doubt]: [f64; 2]) -> Vec<Slide> {
+        self.iter().map(|(disc, state)| disc.judge(state, x, v, [tolerance, doubt])).collect()
     }
 
     /// Compares with other states, into vectors of zeros, at the first unknown of each disc: 1 into `changed` where the name is another;

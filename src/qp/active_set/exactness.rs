@@ -7,7 +7,7 @@
 //! set that comes back lowers the tolerance of the program too, as far as that of the scene.
 
 /// Factor by which the residual drops between two looks at the set.
-pub(super) const LOOSE: f64 = 0.1;
+pub(super) const LOOSE: f64 = 0.4;
 /// What it is multiplied by for a set after a large correction, and for good where sets come back or do not settle, ...
 pub(super) const TIGHTER: f64 = 0.1;
 /// ... and the last before the tolerance.

@@ -133,7 +133,7 @@ fn a_disc_fixes_along_its_slip_and_springs_act_across() {
     let disc = Disc { normal: 2, entries: [0, 1], radius: [0.5, 0.0], flexibility: 2.0 };
     let mut slides = Slides::open(vec![disc]);
     // z = x + v / f = (0, 2): beyond the radius.
-    slides.states = slides.next(&[0.0, 0.5, 0.0], &[0.0, 3.0, 0.0], 0.0);
+    slides.states = slides.next(&[0.0, 0.5, 0.0], &[0.0, 3.0, 0.0], [0.0; 2]);
     assert_eq!(slides.states, [Slide::Slip { direction: [0.0, 1.0], radius: 0.5, compliance: 6.0 }]);
     let (mut x, mut y) = (vec![0.25, 9.0, 1.0], vec![0.0; 3]);
     slides.fix(&mut x);
@@ -149,7 +149,11 @@ fn a_disc_fixes_along_its_slip_and_springs_act_across() {
     slides.mark(&mut kept);
     assert_eq!((&kept[..], &slides.held(&kept)[..]), (&[true, true, false][..], &[false; 3][..]));
     // z = (0, 0.25): inside.
-    assert_eq!(slides.next(&[0.0, 0.5, 0.0], &[0.0, -0.5, 0.0], 1e-9), [Slide::Stick]);
+    assert_eq!(slides.next(&[0.0, 0.5, 0.0], &[0.0, -0.5, 0.0], [1e-9; 2]), [Slide::Stick]);
+    // By what a residual may be: it may slip the other way.
+    let far = [0.0, -30.0, 0.0];
+    assert_eq!(slides.next(&[0.0, 0.5, 0.0], &far, [1e-9; 2]), [Slide::Stick]);
+    assert!(matches!(slides.next(&[0.0, 0.5, 0.0], &far, [1e-9, 31.0])[..], [Slide::Slip { .. }]));
 }
 
 #[test]
@@ -189,10 +193,10 @@ fn soft_springs_are_told_and_turning_is_no_change_of_radius() {
     let disc = Disc { normal: 2, entries: [0, 1], radius: [0.5, 0.0], flexibility: 2.0 };
     let mut slides = Slides::open(vec![disc]);
     for (slides_by, is_soft) in [(3.0, false), (300.0, true)] {
-        slides.states = slides.next(&[0.0, 0.5, 0.0], &[0.0, slides_by, 0.0], 0.0);
+        slides.states = slides.next(&[0.0, 0.5, 0.0], &[0.0, slides_by, 0.0], [0.0; 2]);
         assert_eq!(slides.across().collect::<Vec<_>>(), [([0, 1], [-1.0, 0.0], is_soft)]);
     }
-    let next = slides.next(&[0.0, 0.5, 0.0], &[100.0, 300.0, 0.0], 0.0);
+    let next = slides.next(&[0.0, 0.5, 0.0], &[100.0, 300.0, 0.0], [0.0; 2]);
     let [mut changed, mut fixed, mut hung] = [(); 3].map(|()| vec![0.0; 3]);
     slides.compare(&next, &[0.0, 0.5, 0.0], [&mut changed, &mut fixed, &mut hung]);
     assert_eq!((changed[0], fixed[0]), (0.0, 0.0));
