@@ -3,7 +3,7 @@
 
 use crate::common::{
     COARSE, COARSEST, Run, assert_close, assert_near, assert_residuals, assert_scene_refused, number, scene_file,
-    solve, solve_with, vector,
+    solve, solve_level, solve_with, vector,
 };
 use serde_json::Value;
 
@@ -52,6 +52,37 @@ fn almost_perfect_plasticity_below_collapse_converges() {
     assert!(number(&summary, "plastic_elements") > 0.0);
     // The yield surface grows by next to nothing.
     assert_close("largest stress", number(&summary, "max_von_mises"), 450.0, 1e-4);
+}
+
+/// One layer of flat cells between supports, under a rigid cylinder: parts would bend like plates if they floated.
+#[test]
+fn a_slice_in_plane_strain_takes_few_applications_on_any_mesh() {
+    const SLICE: &str = r#"
+        material.steel = { young = 210e3, poisson = 0.3 }
+        body.block.material = "steel"
+        body.block.element = "hex8"
+        body.block.brick = { origin = [-50.0, 0.0, -50.0], size = [100.0, 1.0, 50.0], cells = [64, 1, 32] }
+        [support]
+        bottom = { surface = "block.zmin", fix = ["x", "y", "z"] }
+        front = { surface = "block.ymin", fix = ["y"] }
+        back = { surface = "block.ymax", fix = ["y"] }
+        [contact.roll]
+        slave = "block.zmax"
+        rigid = { cylinder = { point = [0.0, 0.0, 100.0], axis = [0.0, 1.0, 0.0], radius = 100.0 } }
+        displacement = [0.0, 0.0, -0.3]
+        [decomposition]
+        method = "bricks"
+        cells = [8, 1, 8]
+    "#;
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene_file(directory.path(), SLICE);
+    for level in [1, 2] {
+        for friction in [0.0, 0.3] {
+            let run = solve_level(RANKS, &scene, level, &[&format!("contact.roll.friction={friction}")]);
+            let count = number(&assert_solved(run), "hessian_multiplications");
+            assert!(count <= 45.0, "level {level}, friction {friction}: {count}");
+        }
+    }
 }
 
 /// No history is asked for: the load is halved until there is an equilibrium.
