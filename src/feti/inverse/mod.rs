@@ -54,7 +54,8 @@ impl Inverse {
     }
 
     /// Assembles the tangents `K_k` at an iterate and factorises those whose entries changed by more than `left`, relative to
-    /// their diagonal; with them the `interiors` of the preconditioner, if there is one. Returns for each own subdomain whether its tangent is a new one.
+    /// their diagonal; with them the `interiors` of the preconditioner, if there is one. Returns for each own subdomain whether its
+    /// tangent is a new one.
     ///
     /// # Errors
     /// The first tangent that is singular. Those behind it keep their factors.
