@@ -46,7 +46,7 @@ pub fn stopped_after(steps: usize, out: &Path, sets: &[&str]) -> PathBuf {
 }
 
 /// The increment of each Newton step of a run that came to its end.
-fn newton(out: &Path) -> Vec<u64> {
+pub fn newton(out: &Path) -> Vec<u64> {
     let (summary, _) = result(out, "two-blocks");
     summary["newton"].as_array().unwrap().iter().map(|row| row["increment"].as_u64().unwrap()).collect()
 }
