@@ -9,8 +9,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use fetiplast::comm::solo::Solo;
 use fetiplast::kernels::{
-    Analysis, Coarse, CoarseFace, Factors, Interconnection, Lower, Pins, Precision, Region, Schur, Subdomain,
-    Workspace, analyse, stiffness,
+    Analysis, Coarse, CoarseFace, Factors, Interconnection, Lower, Precision, Region, Schur, Subdomain, Workspace,
+    analyse, stiffness,
 };
 use fetiplast::model::{self, Discrete};
 use fetiplast::scene::Scene;
@@ -79,7 +79,7 @@ fn subdomain(cells: usize) {
         stiffness::assemble(&region, (&rest, &[]), pattern, &mut values);
     });
     for precision in [Precision::Single, Precision::Double] {
-        let mut factors = Factors::new(symbolic.clone(), precision);
+        let mut factors = Factors::new(symbolic.clone(), precision, None);
         let mut schur = Schur::new(
             &symbolic,
             subdomains.iter().map(surface).collect(),
@@ -88,7 +88,7 @@ fn subdomain(cells: usize) {
         );
         let (mut factor, mut interior) = (f64::INFINITY, f64::INFINITY);
         for (own, subdomain) in subdomains.iter().enumerate() {
-            let whole = || factors.factorise(own, subdomain, &values, &Pins::none(), false).expect("it is definite");
+            let whole = || factors.factorise(own, subdomain, &values, false).expect("it is definite");
             factor = factor.min(best(5, whole));
             interior = interior.min(best(5, || schur.update(own, own, &values, false).expect("it is definite")));
         }
@@ -97,7 +97,7 @@ fn subdomain(cells: usize) {
         let mut forces = t.clone();
         let each = |seconds: f64| seconds / COUNT as f64;
         let alone = [best(20, || factors.solve(&mut x)), best(20, || schur.apply(&t, &mut forces))].map(each);
-        factors.factorise(0, &subdomains[0], &values, &Pins::none(), true).expect("it is definite");
+        factors.factorise(0, &subdomains[0], &values, true).expect("it is definite");
         schur.update(0, 0, &values, true).expect("it is definite");
         for own in 1..COUNT {
             factors.share(own, 0);

@@ -16,7 +16,6 @@ use crate::feti::dual::hybrid::Hybrid;
 use crate::feti::dual::operator::DualOperator;
 use crate::feti::inverse::Inverse;
 use crate::feti::inverse::factor::{Factors, analyse};
-use crate::feti::inverse::pins::Pins;
 use crate::feti::inverse::tangents::Linearisation;
 use crate::material::Material;
 use crate::model;
@@ -201,11 +200,11 @@ impl<'a> Setup<'a> {
 
     /// Factors of the elastic stiffness matrices, and these.
     pub fn factors(&self) -> (Factors, Vec<Vec<f64>>) {
-        let mut factors = Factors::new(analyse(self.subdomains()), Precision::Double);
+        let mut factors = Factors::new(analyse(self.subdomains()), Precision::Double, None);
         let mut stiffnesses = Vec::new();
         for (own, subdomain) in self.subdomains().iter().enumerate() {
             let values = elastic(subdomain, self.material(own), &factors.symbolic(own).pattern);
-            factors.factorise(own, subdomain, &values, &Pins::none(), false).expect("elastic bodies are stiff");
+            factors.factorise(own, subdomain, &values, false).expect("elastic bodies are stiff");
             stiffnesses.push(values);
         }
         (factors, stiffnesses)

@@ -111,7 +111,6 @@ pub mod kernels {
     pub use crate::feti::coarse::face::CoarseFace;
     pub use crate::feti::dual::Interconnection;
     pub use crate::feti::inverse::factor::{Factors, analyse};
-    pub use crate::feti::inverse::pins::Pins;
     pub use crate::feti::inverse::schur::Schur;
     pub use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 }

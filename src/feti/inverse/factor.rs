@@ -104,11 +104,13 @@ pub struct Factors {
 }
 
 impl Factors {
-    /// Space for the factors; nothing is factorised yet. With single `precision`, a factor that fails a probe is made again in double.
-    pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision) -> Self {
+    /// Space for the factors, each of which keeps its `pins` at zero, if there are any; nothing is factorised yet. With single `precision`, a factor
+    /// that fails a probe is made again in double.
+    pub fn new(symbolic: Vec<Rc<Symbolic>>, precision: Precision, pins: Option<Vec<Pins>>) -> Self {
         let workspace = Workspace::new(symbolic.iter().map(|s| &s.cholesky));
         let factors = Stock::new(symbolic.iter().map(|s| s.cholesky.factor(precision)));
-        let (stamps, pins) = (vec![0; symbolic.len()], vec![Pins::none(); symbolic.len()]);
+        let stamps = vec![0; symbolic.len()];
+        let pins = pins.unwrap_or_else(|| vec![Pins::none(); symbolic.len()]);
         Self { symbolic, factors, precision, workspace, shifted: Vec::new(), stamps, made: 0, pins }
     }
 
@@ -128,7 +130,7 @@ impl Factors {
     }
 
     /// Factorises `K + rho Q` of an own subdomain, `stiffness` being the lower values of `K`; `common` says that it has twins, here
-    /// or on other ranks. The unknowns of `pins` are kept at zero, and `Q` is of the rigid motions that they leave free.
+    /// or on other ranks. Its pins are kept at zero, and `Q` is of the rigid motions that they leave free.
     ///
     /// # Errors
     /// If the matrix is not positive definite, or not finite.
@@ -137,7 +139,6 @@ impl Factors {
         own: usize,
         subdomain: &Subdomain,
         stiffness: &[f64],
-        pins: &Pins,
         common: bool,
     ) -> Result<(), NotDefinite> {
         let Symbolic { pattern, fixing, cholesky, .. } = &*self.symbolic[own];
@@ -146,11 +147,11 @@ impl Factors {
         self.shifted.extend_from_slice(stiffness);
         let diagonal = pattern.diagonal(stiffness);
         let rho = diagonal.iter().sum::<f64>() / n as f64;
+        let pins = &self.pins[own];
         if !pins.unknowns.is_empty() {
             pattern.uncouple(&pins.unknowns, &mut self.shifted);
         }
         add_fixing(pattern, fixing, (&subdomain.shape, pins), rho, &mut self.shifted);
-        self.pins[own].clone_from(pins);
         let refuse = |pivot| NotDefinite { subdomain: subdomain.id, pivot, dofs: n };
         if !rho.is_finite() {
             return Err(refuse(0));
@@ -184,10 +185,14 @@ impl Factors {
         &self.pins[own].unknowns
     }
 
-    /// From now on an own subdomain has the factor of a congruent one with equal stiffness.
+    /// Whether two own subdomains keep the same at zero.
+    pub fn equally_pinned(&self, own: usize, other: usize) -> bool {
+        self.pins[own] == self.pins[other]
+    }
+
+    /// From now on an own subdomain has the factor of a congruent one with equal stiffness and pins.
     pub fn share(&mut self, own: usize, twin: usize) {
         self.factors.share(own, twin, true);
-        self.pins[own] = self.pins[twin].clone();
         self.stamps[own] = self.stamps[twin];
     }
 

@@ -49,8 +49,7 @@ impl Inverse {
         pins: Option<Vec<Pins>>,
     ) -> Self {
         let has_pins = pins.is_some();
-        let pins = pins.unwrap_or_else(|| vec![Pins::none(); twins.len()]);
-        Self { factors: Factors::new(symbolic, precision), tangents: Tangents::new(twins, pins), pins: has_pins }
+        Self { factors: Factors::new(symbolic, precision, pins), tangents: Tangents::new(twins), pins: has_pins }
     }
 
     /// Assembles the tangents `K_k` at an iterate and factorises those whose entries changed by more than `left`, relative to

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::basis::{Bases, Basis};
 use super::factor::{Factors, NotDefinite};
-use super::pins::Pins;
 use super::schur::Schur;
 use crate::assembly::flow::Flow;
 use crate::assembly::{Region, stiffness};
@@ -49,8 +48,6 @@ pub struct Linearisation<'s> {
 pub(super) struct Tangents {
     /// Congruent subdomains have the same number.
     twins: Vec<Option<usize>>,
-    /// What the factor of each own subdomain keeps at zero.
-    pins: Vec<Pins>,
     /// Lower values of each own subdomain's tangent.
     pub values: Vec<Rc<Vec<f64>>>,
     /// The states that the factors of each own subdomain were made from.
@@ -60,10 +57,10 @@ pub(super) struct Tangents {
 }
 
 impl Tangents {
-    /// Of own subdomains without factors, which are to keep `pins` at zero; `twins` numbers those that have congruent ones.
-    pub fn new(twins: Vec<Option<usize>>, pins: Vec<Pins>) -> Self {
+    /// Of own subdomains without factors; `twins` numbers those that have congruent ones.
+    pub fn new(twins: Vec<Option<usize>>) -> Self {
         let (values, bases) = (vec![Rc::default(); twins.len()], vec![Bases::default(); twins.len()]);
-        Self { twins, pins, values, bases, assembled: Vec::new() }
+        Self { twins, values, bases, assembled: Vec::new() }
     }
 
     /// Makes factors again, to the same bits. Local.
@@ -98,8 +95,7 @@ impl Tangents {
             let common = twin && bases.is_elastic();
             let values = Rc::new(tangent(&regions[own], own, basis, on.factors));
             self.values[own] = Rc::clone(&values);
-            let pins = &self.pins[own];
-            on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, pins, common))?;
+            on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common))?;
         }
         let Some(basis) = &bases.interior else { return Ok(()) };
         if on.schur.is_none() || self.bases[own].interior.as_ref() == Some(basis) {
@@ -176,8 +172,7 @@ impl Tangents {
         self.bases[own].factor = Some(basis.clone());
         let values = Rc::new(self.assembled.clone());
         self.values[own] = Rc::clone(&values);
-        let pins = &self.pins[own];
-        let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, pins, common));
+        let outcome = on.timer.time("factorisation", || on.factors.factorise(own, subdomain, &values, common));
         outcome?;
         // Where a body has become soft but for its volume, the entries of the volume hide it; the pivots do not.
         let drift = self.bases[own].drift;
@@ -204,8 +199,9 @@ impl Tangents {
     /// Gives an elastic subdomain what an elastic twin with equal pins has already; `None` if there is none.
     fn adopt(&mut self, own: usize, id: usize, on: &mut Factorising) -> Option<Result<(), NotDefinite>> {
         let class = self.twins[own]?;
-        let is_alike =
-            |k: &usize| self.twins[*k] == Some(class) && self.pins[*k] == self.pins[own] && self.bases[*k].is_elastic();
+        let is_alike = |k: &usize| {
+            self.twins[*k] == Some(class) && on.factors.equally_pinned(own, *k) && self.bases[*k].is_elastic()
+        };
         let mut twins = (0..self.twins.len()).filter(is_alike);
         let twin = twins.clone().next()?;
         let alike = on.schur.as_ref().and_then(|schur| twins.find(|&k| schur.alike(own, k)));

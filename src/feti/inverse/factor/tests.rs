@@ -47,15 +47,13 @@ fn stretched(subdomain: &Subdomain) -> Vec<f64> {
 fn k_times_its_generalised_inverse_times_k_is_k() {
     for scene in shapes() {
         on_ranks(&scene, 1, |setup| {
-            let mut factors = Factors::new(analyse(setup.subdomains()), Precision::Double);
+            let mut factors = Factors::new(analyse(setup.subdomains()), Precision::Double, None);
             for (own, subdomain) in setup.subdomains().iter().enumerate() {
                 for u in [vec![0.0; subdomain.dofs()], stretched(subdomain)] {
                     let mut values = vec![0.0; factors.symbolic(own).pattern.rows.len()];
                     let region = Region::virgin(subdomain, &MATERIAL);
                     stiffness::assemble(&region, (&u, &[]), &factors.symbolic(own).pattern, &mut values);
-                    factors
-                        .factorise(own, subdomain, &values, &Pins::none(), false)
-                        .expect("stiff up to rigid motions");
+                    factors.factorise(own, subdomain, &values, false).expect("stiff up to rigid motions");
                     let times = |factors: &Factors, x: &[f64]| {
                         let mut y = vec![0.0; x.len()];
                         factors.symbolic(own).pattern.multiply_add(&values, x, &mut y);
@@ -112,7 +110,7 @@ fn a_stiffness_that_is_not_finite_or_not_definite_is_refused_by_name() {
             for at in [0, 1, stiffnesses[2].len() - 1, stiffnesses[2].len() - 2] {
                 let mut values = stiffnesses[2].clone();
                 values[at] = spoilt;
-                let error = factors.factorise(2, subdomain, &values, &Pins::none(), false).expect_err("it is spoilt");
+                let error = factors.factorise(2, subdomain, &values, false).expect_err("it is spoilt");
                 assert_eq!((error.subdomain, error.dofs), (2, subdomain.dofs()));
             }
         }
@@ -145,12 +143,12 @@ fn twins_get_what_they_would_get_alone_and_the_same_bits_beside_any_others() {
         let values = elastic(&subdomains[0], setup.material(0), &symbolic[0].pattern);
         for (precision, tolerance) in [(Precision::Double, 1e-12), (Precision::Single, 1e-4)] {
             let solved = |common: bool, twins: usize| {
-                let mut factors = Factors::new(symbolic.clone(), precision);
+                let mut factors = Factors::new(symbolic.clone(), precision, None);
                 for (own, subdomain) in subdomains.iter().enumerate() {
                     if common && (1..twins).contains(&own) {
                         factors.share(own, 0);
                     } else {
-                        factors.factorise(own, subdomain, &values, &Pins::none(), common).expect("definite");
+                        factors.factorise(own, subdomain, &values, common).expect("definite");
                     }
                 }
                 let mut x = given.clone();
@@ -181,11 +179,12 @@ fn pinned_unknowns_stay_and_the_others_give_way_as_on_their_supports() {
     let mut seen = HashSet::new();
     for scene in supported() {
         let counts = on_ranks(&scene, 1, |setup| {
-            let (mut factors, stiffnesses) = setup.factors();
+            let stiffnesses = setup.factors().1;
             let pins = Pins::of_supports(&setup.discrete.constraints, setup.subdomains());
+            let mut factors = Factors::new(analyse(setup.subdomains()), Precision::Double, Some(pins.clone()));
             for (own, pins) in pins.iter().enumerate() {
                 let (subdomain, values) = (&setup.subdomains()[own], &stiffnesses[own]);
-                factors.factorise(own, subdomain, values, pins, false).expect("what is left free is held");
+                factors.factorise(own, subdomain, values, false).expect("what is left free is held");
                 assert_eq!(factors.pinned(own), pins.unknowns);
                 let k = dense(&factors.symbolic(own).pattern, values);
                 let is_free = |dof: &usize| !pins.unknowns.contains(&(*dof as u32));
