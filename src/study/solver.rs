@@ -56,7 +56,7 @@ pub(super) fn step_solver<'a>(
     let hybrid = timer.time("clusters", || Hybrid::of_clusters(connection, decomposition, constraints))?;
     let pins = timer.time("symbolic analysis", || Pins::of_supports(constraints, subdomains));
     let has_pins = space.counts([pins.iter().filter(|pins| !pins.unknowns.is_empty()).count() as u64]) != [0];
-    let pins = (has_pins && hybrid.is_none()).then_some(pins);
+    let pins = has_pins.then_some(pins);
     let twins = timer.time("symbolic analysis", || twins(comm, subdomains));
     let inverse = Inverse::new(symbolic, precision, twins, pins);
     let operator = DualOperator::new(inverse, hybrid, gather);
