@@ -143,16 +143,28 @@ fn a_run_stopped_at_any_moment_arrives_at_the_same_bits_on_other_ranks() {
     assert!(stopped > 0, "no moment was early enough");
 }
 
+/// Stops a run after every step but the last two, and goes on on other ranks.
+fn assert_stops_change_nothing(sets: &[&str]) {
+    let directory = tempfile::tempdir().unwrap();
+    let [whole, out] = ["whole", "stopped"].map(|name| directory.path().join(name));
+    assert_eq!(run_disturbed(2, &solve(&whole, sets, &[]), |_| ()).code, 0);
+    let file = stopped_after(newton(&whole).len() - 2, &out, sets);
+    assert_eq!(resume(3, &file).code, 0);
+    assert_same_result(&out, &whole, "two-blocks");
+}
+
 /// Deluxe scaling and subdomains that supports hold still are not in a checkpoint: they follow from what is.
 #[test]
 fn a_rigid_body_that_flows_stopped_after_every_step_arrives_at_the_same_bits() {
-    let sets = [&COARSE[..], &["material.lower.young=2.1e11"]].concat();
-    let directory = tempfile::tempdir().unwrap();
-    let [whole, out] = ["whole", "stopped"].map(|name| directory.path().join(name));
-    assert_eq!(run_disturbed(2, &solve(&whole, &sets, &[]), |_| ()).code, 0);
-    let file = stopped_after(newton(&whole).len() - 2, &out, &sets);
-    assert_eq!(resume(3, &file).code, 0);
-    assert_same_result(&out, &whole, "two-blocks");
+    assert_stops_change_nothing(&[&COARSE[..], &["material.lower.young=2.1e11"]].concat());
+}
+
+/// What slips, its radii and springs follow from multipliers and slips.
+#[test]
+fn a_history_with_friction_stopped_after_every_step_arrives_at_the_same_bits() {
+    for law in ["contact.joint.friction=0.3", "contact.joint.shear_limit=5.0"] {
+        assert_stops_change_nothing(&[&COARSE[..], &[HISTORY, law]].concat());
+    }
 }
 
 #[test]
