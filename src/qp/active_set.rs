@@ -173,6 +173,7 @@ impl Run<'_> {
                 return Outcome::Cycled;
             }
             wish.copy_from_slice(&self.x);
+            self.slides.align(&mut wish);
             if changes == 0.0 {
                 follows += 1;
                 continue;
@@ -243,7 +244,7 @@ impl Run<'_> {
         let enough = norm.max(tolerance);
         if d[0] > 0.0 || d[2].sqrt() > enough {
             self.slides.add_compliance(1.0, &self.x, &mut self.residual);
-            self.slides.states = next;
+            self.slides.take(next);
             self.slides.mark(&mut self.kept);
             return Correction::Set(d[0]);
         }

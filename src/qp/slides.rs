@@ -76,6 +76,8 @@ pub struct Slides {
     pub discs: Vec<Disc>,
     /// Of each.
     pub states: Vec<Slide>,
+    /// Whether it has turned round.
+    turned: Vec<bool>,
 }
 
 impl Disc {
@@ -107,7 +109,7 @@ impl Disc {
     }
 
     /// What the unknowns and what slides tell of it, see [`Slides::next`].
-    fn judge(&self, state: Slide, x: &[f64], v: &[f64], [tolerance, doubt]: [f64; 2]) -> Slide {
+    fn judge(&self, (state, turned): (Slide, bool), x: &[f64], v: &[f64], [tolerance, doubt]: [f64; 2]) -> Slide {
         let radius = self.radius(x);
         if radius <= NOTHING * tolerance / self.flexibility {
             return Slide::Open;
@@ -116,12 +118,13 @@ impl Disc {
         let z = [a + s / self.flexibility, b + t / self.flexibility];
         let size = z[0].hypot(z[1]);
         let margin = tolerance / self.flexibility;
+        let outside = size > radius * (1.0 + ROUNDING) + margin;
         let slips = match state {
-            // The other border is far: what slides against its friction sticks first.
-            Slide::Slip { direction, .. } if s * direction[0] + t * direction[1] < -doubt => false,
+            // What slides against its friction turns round once; then it sticks first.
+            Slide::Slip { direction, .. } if s * direction[0] + t * direction[1] < -doubt => outside && !turned,
             Slide::Slip { .. } => size > radius * (1.0 - ROUNDING) - margin,
             Slide::Open => size > radius,
-            Slide::Stick => size > radius * (1.0 + ROUNDING) + margin,
+            Slide::Stick => outside,
         };
         if !slips || size == 0.0 {
             return Slide::Stick;
@@ -135,13 +138,18 @@ impl Slides {
     /// Discs of which nothing is known: all are open.
     pub fn open(discs: Vec<Disc>) -> Self {
         let states = vec![Slide::Open; discs.len()];
-        Self { discs, states }
+        Self::in_states(discs, states)
     }
 
     /// Discs as unknowns `x` and what slides, `v`, tell.
     pub fn told(discs: Vec<Disc>, x: &[f64], v: &[f64]) -> Self {
-        let states = discs.iter().map(|disc| disc.judge(Slide::Open, x, v, [0.0; 2])).collect();
-        Self { discs, states }
+        let states = discs.iter().map(|disc| disc.judge((Slide::Open, false), x, v, [0.0; 2])).collect();
+        Self::in_states(discs, states)
+    }
+
+    fn in_states(discs: Vec<Disc>, states: Vec<Slide>) -> Self {
+        let turned = vec![false; discs.len()];
+        Self { discs, states, turned }
     }
 
     /// The radius of each disc at some unknowns.
@@ -260,6 +268,15 @@ impl Slides {
         })
     }
 
+    /// Puts unknowns that slip at the radius along their slips, with nothing across: there the slip has followed what was across.
+    pub fn align(&self, x: &mut [f64]) {
+        for (disc, state) in self.iter() {
+            if let Slide::Slip { direction, radius, .. } = state {
+                disc.put(direction.map(|d| radius * d), x);
+            }
+        }
+    }
+
     /// Gives unknowns their fixed parts: none where open, the radius along the slip.
     pub fn fix(&self, x: &mut [f64]) {
         for (disc, state) in self.iter() {
@@ -322,9 +339,22 @@ impl Slides {
 
     /// The states that the unknowns and what slides, `v`, tell. A change between sticking and slipping takes more than `tolerance` of
     /// what slides, and more than `doubt` where it slides against its friction: what sticks by mistake comes loose again from its
-    /// border only, one row of nodes with each set.
+    /// border only, one row of nodes with each set. So what is beyond the other side of its disc slips there at once; but once only, for
+    /// bodies that friction alone holds would be thrown to and fro.
     pub fn next(&self, x: &[f64], v: &[f64], [tolerance, doubt]: [f64; 2]) -> Vec<Slide> {
-        self.iter().map(|(disc, state)| disc.judge(state, x, v, [tolerance, doubt])).collect()
+        let judge =
+            |((disc, state), &turned): ((&Disc, Slide), &bool)| disc.judge((state, turned), x, v, [tolerance, doubt]);
+        self.iter().zip(&self.turned).map(judge).collect()
+    }
+
+    /// Takes other states on, and notes what turns round.
+    pub fn take(&mut self, next: Vec<Slide>) {
+        for ((turned, state), next) in self.turned.iter_mut().zip(&self.states).zip(&next) {
+            if let (Slide::Slip { direction: [a, b], .. }, Slide::Slip { direction: [s, t], .. }) = (state, next) {
+                *turned |= a * s + b * t < 0.0;
+            }
+        }
+        self.states = next;
     }
 
     /// Compares with other states, into vectors of zeros, at the first unknown of each disc: 1 into `changed` where the name is another;

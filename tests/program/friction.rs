@@ -229,15 +229,13 @@ fn a_pulled_bar_slips_as_far_as_friction_takes_and_keeps_half_of_it() {
 }
 
 #[test]
-fn friction_costs_little_and_none_costs_nothing() {
+fn no_friction_costs_nothing() {
     let bits = |sets: &[&str]| {
         let run = solve(2, "two-blocks", sets).converged();
         (number(&run.summary(), "hessian_multiplications"), Fields::read(&run.result()).bits(&["VTKHDF/PointData"]))
     };
     let (without, plain) = bits(&[]);
     assert_eq!(bits(&["contact.joint.friction=0.0"]), (without, plain));
-    assert!(bits(&["contact.joint.friction=0.3"]).0 <= 2.0 * without);
-    assert!(bits(&["contact.joint.shear_limit=10.0"]).0 <= 2.0 * without);
 }
 
 #[test]
@@ -267,11 +265,14 @@ fn friction_costs_few_more_applications_of_the_dual_operator() {
         let run = solve(2, "two-blocks", &[law, cut]).converged();
         number(&run.summary(), "hessian_multiplications")
     };
-    for (cut, most) in [("bricks", [2.0, 2.0, 1.6]), ("metis", [2.0, 2.5, 2.0])] {
+    let laws = ["friction=0.3", "friction=0.8"].into_iter();
+    let laws = laws.chain(["shear_limit=2.0", "shear_limit=7.0", "shear_limit=10.0", "shear_limit=14.0"]);
+    for cut in ["bricks", "metis"] {
         let cut = format!("decomposition.method=\"{cut}\"");
         let plain = applications("contact.joint.friction=0.0", &cut);
-        for (law, most) in ["friction=0.3", "friction=0.8", "shear_limit=10.0"].into_iter().zip(most) {
+        for law in laws.clone() {
             let found = applications(&format!("contact.joint.{law}"), &cut);
+            let most = if law.starts_with("friction") { 2.0 } else { 1.6 };
             assert!(found <= most * plain, "{law}, {cut}: {found} beside {plain}");
         }
     }
