@@ -75,7 +75,7 @@ pub struct Slides {
     /// The discs.
     pub discs: Vec<Disc>,
     /// Of each.
-    pub states: Vec<Slide>,
+    states: Vec<Slide>,
     /// Whether it has turned round.
     turned: Vec<bool>,
 }
@@ -268,7 +268,8 @@ impl Slides {
         })
     }
 
-    /// Puts unknowns that slip at the radius along their slips, with nothing across: there the slip has followed what was across.
+    /// Puts unknowns that slip at the radius along their slips, with nothing across: directions that have just followed them have taken
+    /// that in.
     pub fn align(&self, x: &mut [f64]) {
         for (disc, state) in self.iter() {
             if let Slide::Slip { direction, radius, .. } = state {
