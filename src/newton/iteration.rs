@@ -52,7 +52,7 @@ enum Trial {
 pub struct Newton<'a> {
     pub(super) problem: TornProblem<'a>,
     pub(super) solver: StepSolver<'a>,
-    settings: Settings,
+    pub(super) settings: Settings,
     pub(super) path: Path,
     pub(super) attempt: Attempt,
     pub(super) iterate: Iterate,
@@ -87,7 +87,7 @@ impl<'a> Newton<'a> {
             stages,
         };
         let rest = |problem: &TornProblem| (problem.gather.zeros(), vec![0.0; problem.gather.rows()]);
-        let (mut attempt, mut forcing) = (Attempt::FIRST, Forcing::default());
+        let (mut attempt, mut forcing) = (Attempt::FIRST, Forcing::first(settings.accuracy));
         let (mut reached, mut origin, mut steps, mut before, mut stood, mut reach) =
             (None, None, Vec::new(), 0, None, None);
         let ((u, lambda), kept) = match begin {
@@ -373,7 +373,7 @@ impl<'a> Newton<'a> {
         let (iterate, outcome) = iterate::first(problem, solver, (u, lambda), kept, None, timer);
         self.admissible = problem.is_admissible(&iterate.u);
         (self.attempt, self.iterate, self.outcome) = (attempt, iterate, outcome);
-        (self.forcing, self.before) = (Forcing::default(), self.steps.len());
+        (self.forcing, self.before) = (Forcing::first(self.settings.accuracy), self.steps.len());
     }
 
     /// The problem, with all that is committed, and the displacement at the end of the last increment that was reached; that of

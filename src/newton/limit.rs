@@ -84,6 +84,6 @@ impl Newton<'_> {
         let rest = vec![0.0; self.problem.gather.rows()];
         let (iterate, outcome) = iterate::first(&self.problem, &mut self.solver, (u, rest), kept, None, timer);
         (self.iterate, self.outcome, self.admissible) = (iterate, outcome, true);
-        (self.forcing, self.before) = (Forcing::default(), self.steps.len());
+        (self.forcing, self.before) = (Forcing::first(self.settings.accuracy), self.steps.len());
     }
 }

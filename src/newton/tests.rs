@@ -141,7 +141,7 @@ fn the_energy_falls_in_every_step_and_the_end_is_quadratic() {
 
 #[test]
 fn too_few_steps_or_products_end_as_outcomes() {
-    for (limit, word) in [("solver.newton_limit=2", "newton_limit"), ("solver.qp_limit=3", "qp_limit")] {
+    for (limit, word) in [("solver.newton_limit=2", "newton_limit"), ("solver.qp_limit=2", "qp_limit")] {
         for method in METHODS {
             let (summary, _) = solve(&plastic(&[&method[..], &[limit]].concat()), 2);
             assert_eq!(summary.converged, Some(false), "{method:?}");
