@@ -22,6 +22,9 @@ use crate::scene::Qp;
 /// Of a residual its projection cannot tell more than this share, and surely less than a tenth of it.
 const ROUNDING: f64 = 1e-14;
 
+/// A program that is not the last may leave this share of contacts on the wrong set: the next one corrects them along with its own.
+const ASTRAY: f64 = 0.1;
+
 /// How to solve the programs.
 #[derive(Clone, Copy, Debug)]
 pub struct ProgramSettings {
@@ -265,7 +268,7 @@ impl Programs {
         face.slides.adopt(&kept);
         let (slides, has_discs, uneven) =
             (face.slides.clone(), problem.constraints.has_friction, problem.constraints.uneven);
-        let start = active_set::Guess { x, residual, kept, slides, has_discs, uneven, directions };
+        let start = active_set::Guess { x, residual, kept, slides, has_discs, uneven, astray: ASTRAY, directions };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let at_floor = self.note(&limits, solution.first_norm);
         let active_set::Solution { x: balanced, residual, slides, outcome, statistics, directions, .. } = solution;

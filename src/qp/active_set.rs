@@ -5,7 +5,8 @@
 //! Kept rows with x_i < 0 are let go; other rows with a violated gap, (d - A x - G'a)_i > 0, are taken in.
 //!
 //! The equality problems are solved loosely. Each time the residual has dropped by a factor the set is checked, and PCPG
-//! goes on with its directions if the set stands. How loosely depends on how the sets go (`exactness`).
+//! goes on with its directions if the set stands. How loosely depends on how the sets go (`exactness`). Where the tolerance is not the
+//! caller's last, it can do with a set on which few rows are still wrong; the last correction is made, and not solved for.
 //!
 //! Discs ([`super::slides`]) are corrected along with the bounds. Where none of them changes its set, radii and directions of slips
 //! follow once they are further off than the residual. Then the caller's `A` includes the springs across slips. Where radii grow with
@@ -80,6 +81,8 @@ pub struct Guess {
     pub has_discs: bool,
     /// Whether rows are of unequal length, as where stiffness jumps.
     pub uneven: bool,
+    /// Where the tolerance is that of `drop`: the share of bounds that may be on the wrong set in the end.
+    pub astray: f64,
     /// Directions on the first set.
     pub directions: Directions,
 }
@@ -87,12 +90,13 @@ pub struct Guess {
 /// Solves the problem. Give `limits` a reference at a warm start: the default is the first residual, which is too small
 /// there.
 pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Guess, limits: &Limits) -> Solution {
-    let Guess { x, residual, kept, slides, has_discs, uneven, directions } = start;
+    let Guess { x, residual, kept, slides, has_discs, uneven, astray, directions } = start;
     let n = x.len();
     let mut run = Run {
         space,
         bounded,
         uneven,
+        few: 0.0,
         x: x.clone(),
         residual,
         kept,
@@ -104,6 +108,10 @@ pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Gu
         first_norm: f64::NAN,
     };
     let mut solver = Pcpg::with(space, directions);
+    if astray > 0.0 {
+        let bounds: Vec<f64> = bounded.iter().map(|&b| f64::from(b)).collect();
+        run.few = astray * space.dot(&bounds, &bounds);
+    }
     run.slides.add_compliance(-1.0, &x, &mut run.residual);
     let outcome = run.iterate(face, &mut solver, x, limits);
     run.slides.add_compliance(1.0, &run.x, &mut run.residual);
@@ -116,6 +124,8 @@ struct Run<'a> {
     space: &'a dyn Space,
     bounded: &'a [bool],
     uneven: bool,
+    /// So many bounds and discs may be on the wrong set where the tolerance is not the last.
+    few: f64,
     x: Vec<f64>,
     residual: Vec<f64>,
     kept: Vec<bool>,
@@ -143,7 +153,7 @@ impl Run<'_> {
                 limits.target(self.first_norm)
             });
             let relative = exactness.take_relative();
-            let changes = loop {
+            let (changes, norm) = loop {
                 let products = limits.products.saturating_sub(self.statistics.hessian);
                 let limits = Limits { relative, reference: None, absolute: goal, drop: 0.0, products };
                 let report = solver.solve(face, &mut self.x, &mut self.residual, &limits);
@@ -151,7 +161,8 @@ impl Run<'_> {
                 if report.outcome != Outcome::Converged {
                     return report.outcome;
                 }
-                match self.correct(face, goal, report.norm) {
+                let doubt = if exactness.turns_for_ever() { 0.0 } else { goal.max(DOUBT * report.norm) };
+                match self.correct(face, [goal, doubt], report.norm) {
                     Correction::None if report.norm <= goal => return Outcome::Converged,
                     Correction::None => {}
                     Correction::Shift if follows < FOLLOWS => {
@@ -162,7 +173,11 @@ impl Run<'_> {
                         solver.descend(&mut self.x, &mut self.residual);
                     }
                     Correction::Shift => return Outcome::Cycled,
-                    Correction::Set(changes) => break changes,
+                    Correction::Springs(distance) => {
+                        exactness.note_springs(distance);
+                        break (0.0, report.norm);
+                    }
+                    Correction::Set(changes) => break (changes, report.norm),
                 }
             };
             solver.forget();
@@ -171,6 +186,9 @@ impl Run<'_> {
             self.slides.add_compliance(-1.0, &self.x, &mut self.residual);
             if !complete {
                 return Outcome::Cycled;
+            }
+            if norm <= goal && goal > floor && changes <= self.few {
+                return Outcome::Converged;
             }
             wish.copy_from_slice(&self.x);
             self.slides.align(&mut wish);
@@ -218,8 +236,9 @@ impl Run<'_> {
     }
 
     /// Lets rows of negative force go and takes rows of violated gap in, and corrects discs. The tolerance of gaps keeps rows that have
-    /// neither force nor gap from coming and going. Where the set is another one `residual` is without springs afterwards.
-    fn correct(&mut self, face: &mut dyn Face, tolerance: f64, norm: f64) -> Correction {
+    /// neither force nor gap from coming and going; what slides against its friction by less than `doubt` does not. Where the set is
+    /// another one `residual` is without springs afterwards.
+    fn correct(&mut self, face: &mut dyn Face, [tolerance, doubt]: [f64; 2], norm: f64) -> Correction {
         self.work.copy_from_slice(&self.residual);
         face.gaps(&mut self.work);
         let mut moved = Vec::new();
@@ -237,16 +256,16 @@ impl Run<'_> {
             let changes = self.space.dot(&self.work, &self.work);
             return if changes > 0.0 { Correction::Set(changes) } else { Correction::None };
         }
-        let next = self.slides.next(&self.x, &moved, [tolerance, tolerance.max(DOUBT * norm)]);
+        let next = self.slides.next(&self.x, &moved, [tolerance, doubt]);
         let [mut fixed, mut hung] = [(); 2].map(|()| vec![0.0; self.x.len()]);
         self.slides.compare(&next, &self.x, [&mut self.work, &mut fixed, &mut hung]);
         let d = self.space.dots(&[(&self.work, &self.work), (&fixed, &fixed), (&hung, &hung)]);
-        let enough = norm.max(tolerance);
-        if d[0] > 0.0 || d[2].sqrt() > enough {
+        let (enough, springs) = (norm.max(tolerance), d[2].sqrt());
+        if d[0] > 0.0 || springs > enough {
             self.slides.add_compliance(1.0, &self.x, &mut self.residual);
             self.slides.take(next);
             self.slides.mark(&mut self.kept);
-            return Correction::Set(d[0]);
+            return if d[0] > 0.0 { Correction::Set(d[0]) } else { Correction::Springs(springs) };
         }
         if d[1].sqrt() > enough {
             self.slides.shift(&next);
@@ -273,97 +292,11 @@ enum Correction {
     None,
     /// Discs fix their unknowns elsewhere; matrix and set stay as they are.
     Shift,
-    /// The set is another one, or springs are; with the number of bounds and discs that changed theirs.
+    /// Springs across slips are others; with what that moves the residual by.
+    Springs(f64),
+    /// The set is another one; with the number of bounds and discs that changed theirs.
     Set(f64),
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::power;
-    use super::super::tests::dense::{Plain, distance, dot};
-    use super::super::tests::torn::{Torn, homogenised};
-    use super::*;
-
-    const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
-
-    fn from(torn: &mut Torn, x: Vec<f64>, mut kept: Vec<bool>, limits: &Limits) -> Solution {
-        let bounded = torn.bounded.clone();
-        assert!(torn.restrict(&mut kept, &Slides::default()));
-        let residual = torn.f.times(&x).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();
-        solve(
-            &Plain,
-            torn,
-            &bounded,
-            Guess {
-                x,
-                residual,
-                kept,
-                slides: Slides::default(),
-                has_discs: false,
-                uneven: false,
-                directions: Directions::default(),
-            },
-            limits,
-        )
-    }
-
-    #[test]
-    fn equals_smalse() {
-        for (preconditioned, most) in [(false, 85), (true, 65)] {
-            let mut torn = Torn::membrane(4, 6);
-            torn.preconditioned = preconditioned;
-            let n = torn.d.len();
-            let slow = homogenised(&mut torn, 1e-8);
-            let fast = from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS);
-            assert_eq!((slow.outcome, fast.outcome), (Outcome::Converged, Outcome::Converged));
-            assert!(slow.statistics.hessian <= if preconditioned { 130 } else { 175 }, "{:?}", slow.statistics);
-            assert!(distance(&slow.x, &fast.x) < 1e-5 * dot(&fast.x, &fast.x).sqrt());
-            assert!(fast.statistics.hessian <= most, "{:?}", fast.statistics);
-            let (rows, carrying) =
-                (torn.bounded.iter().filter(|b| **b).count(), fast.kept.iter().filter(|k| !**k).count());
-            assert!(carrying > 0 && carrying < rows, "{carrying} of {rows}");
-            torn.restrict(&mut fast.kept.clone(), &Slides::default());
-            let mut gaps = fast.residual.clone();
-            torn.gaps(&mut gaps);
-            for i in (0..n).filter(|i| torn.bounded[*i]) {
-                assert!(fast.x[i] >= 0.0 && gaps[i] < 1e-6);
-            }
-        }
-    }
-
-    #[test]
-    fn any_start_gives_the_same_and_the_solution_costs_nothing() {
-        let mut torn = Torn::membrane(3, 5);
-        let n = torn.d.len();
-        let first = from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS);
-        let none: Vec<bool> = torn.bounded.iter().map(|b| !b).collect();
-        let other = from(&mut torn, vec![0.0; n], none, &LIMITS);
-        assert_eq!((other.outcome, &other.kept), (Outcome::Converged, &first.kept));
-        assert!(distance(&first.x, &other.x) < 1e-5 * dot(&first.x, &first.x).sqrt());
-        let limits = Limits { reference: Some(dot(&torn.d, &torn.d).sqrt()), ..LIMITS };
-        let again = from(&mut torn, first.x, first.kept, &limits);
-        assert_eq!(again.outcome, Outcome::Converged);
-        assert!(again.statistics.hessian <= 2, "{:?}", again.statistics);
-    }
-
-    #[test]
-    fn norm_of_a_dual_problem() {
-        let mut torn = Torn::membrane(3, 5);
-        let n = torn.d.len();
-        torn.restrict(&mut vec![true; n], &Slides::default());
-        let start = torn.d.clone();
-        let found = power::norm(&Plain, &mut torn, &start).expect("an estimate");
-        assert!(found.products <= 12);
-    }
-
-    #[test]
-    fn faults_end_as_outcomes() {
-        let mut torn = Torn::membrane(3, 5);
-        let n = torn.d.len();
-        let limits = Limits { products: 5, ..LIMITS };
-        assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &limits).outcome, Outcome::LimitReached);
-        assert!(!torn.restrict(&mut vec![false; n], &Slides::default()));
-        torn.f.entries[3] = f64::NAN;
-        assert_eq!(from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS).outcome, Outcome::NotFinite);
-    }
-}
+mod tests;

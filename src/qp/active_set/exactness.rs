@@ -14,6 +14,10 @@ pub(super) const TIGHTER: f64 = 0.1;
 const LEAST: f64 = 1e-3;
 /// A correction that changes this many times more rows than the smallest so far: sets are corrected too early.
 const GROWTH: f64 = 1.3;
+/// A correction of springs that is not below this share of the last one: springs are corrected too early.
+const SETTLING: f64 = 0.7;
+/// So many of them one after the other: slips turn to and fro.
+const TURNS: usize = 3;
 /// So many corrections without one that is smaller than all before: sets do not settle.
 const SLOW: usize = 6;
 
@@ -29,11 +33,23 @@ pub(super) struct Exactness {
     smallest: f64,
     /// ... and how many came after it, or after that became more exact.
     since: usize,
+    /// What the last correction of springs on this set moved the residual by, ...
+    springs: f64,
+    /// ... and how many came one after the other that were not much smaller than the one before.
+    unsettled: usize,
 }
 
 impl Exactness {
     pub fn new(first: Vec<bool>, loose: f64) -> Self {
-        Self { history: vec![first], loose, wary: false, smallest: f64::INFINITY, since: 0 }
+        Self {
+            history: vec![first],
+            loose,
+            wary: false,
+            smallest: f64::INFINITY,
+            since: 0,
+            springs: f64::INFINITY,
+            unsettled: 0,
+        }
     }
 
     /// How far the residual drops on this set.
@@ -41,8 +57,20 @@ impl Exactness {
         if std::mem::take(&mut self.wary) { self.loose * TIGHTER } else { self.loose }
     }
 
+    /// Takes note of a correction that left the set as it is and moved the residual by `distance` with springs across slips.
+    pub fn note_springs(&mut self, distance: f64) {
+        self.unsettled = if distance > SETTLING * self.springs { self.unsettled + 1 } else { 0 };
+        self.springs = distance;
+    }
+
+    /// Whether springs do not settle on this set.
+    pub fn turns_for_ever(&self) -> bool {
+        self.unsettled >= TURNS
+    }
+
     /// Takes note of a correction with so many changes.
     pub fn note(&mut self, changes: f64) {
+        (self.springs, self.unsettled) = (f64::INFINITY, 0);
         self.wary = changes > GROWTH * self.smallest;
         self.since = if changes < self.smallest { 0 } else { self.since + 1 };
         self.smallest = self.smallest.min(changes);
@@ -62,6 +90,22 @@ impl Exactness {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slips_that_turn_to_and_fro_are_found() {
+        let mut exactness = Exactness::new(vec![true], LOOSE);
+        let mut tell = |distances: &[f64]| {
+            distances.iter().for_each(|&d| exactness.note_springs(d));
+            exactness.turns_for_ever()
+        };
+        assert!(!tell(&[3.0, 2.5, 2.4, 1.0, 0.9, 0.8]));
+        assert!(tell(&[0.7]));
+        assert!(!tell(&[0.1]));
+        assert!(tell(&[0.1; 3]));
+        // Another set, another chance.
+        exactness.note(5.0);
+        assert!(!exactness.turns_for_ever());
+    }
 
     #[test]
     fn sets_that_do_not_settle_are_solved_more_exactly_for_good() {

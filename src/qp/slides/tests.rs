@@ -98,6 +98,7 @@ fn solved(a: Matrix, d: &[f64], discs: Vec<Disc>) -> active_set::Solution {
         kept,
         slides,
         has_discs: true,
+        astray: 0.0,
         uneven: false,
         directions: Directions::default(),
     };
