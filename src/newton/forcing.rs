@@ -44,7 +44,7 @@ pub struct Forcing {
 impl Forcing {
     /// For the first step, which an `accuracy` may end the iteration after.
     pub fn first(accuracy: Option<f64>) -> Self {
-        Self { drop: accuracy.map_or(FIRST, |_| ONLY), floor: FLOOR, left: 0.0 }
+        Self { drop: if accuracy.is_some() { ONLY } else { FIRST }, floor: FLOOR, left: 0.0 }
     }
 
     /// For the step after one that brought the true residual from `before` to `after`, where `wanted` is enough in the

@@ -52,7 +52,7 @@ enum Trial {
 pub struct Newton<'a> {
     pub(super) problem: TornProblem<'a>,
     pub(super) solver: StepSolver<'a>,
-    pub(super) settings: Settings,
+    settings: Settings,
     pub(super) path: Path,
     pub(super) attempt: Attempt,
     pub(super) iterate: Iterate,
@@ -370,9 +370,15 @@ impl<'a> Newton<'a> {
             Some(reached) => (reached.u.clone(), Some(problem.laws().kept(&reached.lambda, 0.0))),
             None => (problem.gather.zeros(), None),
         };
-        let (iterate, outcome) = iterate::first(problem, solver, (u, lambda), kept, None, timer);
-        self.admissible = problem.is_admissible(&iterate.u);
-        (self.attempt, self.iterate, self.outcome) = (attempt, iterate, outcome);
+        let first = iterate::first(problem, solver, (u, lambda), kept, None, timer);
+        let admissible = problem.is_admissible(&first.0.u);
+        self.attempt = attempt;
+        self.start_at(first, admissible);
+    }
+
+    /// Starts the iteration at its first iterate, which may have come to an end; no step so far belongs to it.
+    pub(super) fn start_at(&mut self, (iterate, outcome): (Iterate, Option<Outcome>), admissible: bool) {
+        (self.iterate, self.outcome, self.admissible) = (iterate, outcome, admissible);
         (self.forcing, self.before) = (Forcing::first(self.settings.accuracy), self.steps.len());
     }
 

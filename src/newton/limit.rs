@@ -11,7 +11,6 @@
 //! that is there ([`crate::assembly::dissipation`]). Both are bounds of the limit of the mesh; that of conforming meshes is above the exact one.
 
 use super::control::{add, most};
-use super::forcing::Forcing;
 use super::iterate;
 use super::iteration::Newton;
 use super::snapshot::Reached;
@@ -82,8 +81,7 @@ impl Newton<'_> {
     fn begin(&mut self, u: Torn, lambda: Option<&[f64]>, timer: &Timer) {
         let kept = lambda.map(|lambda| self.problem.laws().kept(lambda, 0.0));
         let rest = vec![0.0; self.problem.gather.rows()];
-        let (iterate, outcome) = iterate::first(&self.problem, &mut self.solver, (u, rest), kept, None, timer);
-        (self.iterate, self.outcome, self.admissible) = (iterate, outcome, true);
-        (self.forcing, self.before) = (Forcing::first(self.settings.accuracy), self.steps.len());
+        let first = iterate::first(&self.problem, &mut self.solver, (u, rest), kept, None, timer);
+        self.start_at(first, true);
     }
 }

@@ -18,6 +18,8 @@
 
 mod exactness;
 
+use std::ops::ControlFlow;
+
 use self::exactness::{Exactness, LOOSE};
 use super::pcpg::{Directions, Pcpg};
 use super::quadratic::{Quadratic, Space};
@@ -49,7 +51,7 @@ pub trait Face: Quadratic {
 
 /// What was found.
 pub struct Solution {
-    /// The unknowns, zero off the kept rows; not negative where bounded if converged.
+    /// The unknowns. If converged they are zero off the kept rows and not negative where bounded, but for the rows that are astray.
     pub x: Vec<f64>,
     /// `d - A x`.
     pub residual: Vec<f64>,
@@ -97,6 +99,7 @@ pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Gu
         bounded,
         uneven,
         few: 0.0,
+        follows: 0,
         x: x.clone(),
         residual,
         kept,
@@ -126,6 +129,8 @@ struct Run<'a> {
     uneven: bool,
     /// So many bounds and discs may be on the wrong set where the tolerance is not the last.
     few: f64,
+    /// How often directions and radii of discs have been followed.
+    follows: usize,
     x: Vec<f64>,
     residual: Vec<f64>,
     kept: Vec<bool>,
@@ -143,8 +148,7 @@ impl Run<'_> {
     fn iterate(&mut self, face: &mut dyn Face, solver: &mut Pcpg, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
         let (mut target, mut floor) = (None, 0.0);
         let mut exactness = Exactness::new(self.names(), if self.uneven { 0.0 } else { LOOSE });
-        let mut follows = 0;
-        while exactness.history.len() <= SETS && follows < FOLLOWS {
+        while exactness.history.len() <= SETS && self.follows < FOLLOWS {
             self.move_to(face, &mut wish);
             self.statistics.sets += 1;
             let goal = *target.get_or_insert_with(|| {
@@ -153,32 +157,10 @@ impl Run<'_> {
                 limits.target(self.first_norm)
             });
             let relative = exactness.take_relative();
-            let (changes, norm) = loop {
-                let products = limits.products.saturating_sub(self.statistics.hessian);
-                let limits = Limits { relative, reference: None, absolute: goal, drop: 0.0, products };
-                let report = solver.solve(face, &mut self.x, &mut self.residual, &limits);
-                self.statistics += report.statistics;
-                if report.outcome != Outcome::Converged {
-                    return report.outcome;
-                }
-                let doubt = if exactness.turns_for_ever() { 0.0 } else { goal.max(DOUBT * report.norm) };
-                match self.correct(face, [goal, doubt], report.norm) {
-                    Correction::None if report.norm <= goal => return Outcome::Converged,
-                    Correction::None => {}
-                    Correction::Shift if follows < FOLLOWS => {
-                        follows += 1;
-                        self.statistics.sets += 1;
-                        wish.copy_from_slice(&self.x);
-                        self.move_to(face, &mut wish);
-                        solver.descend(&mut self.x, &mut self.residual);
-                    }
-                    Correction::Shift => return Outcome::Cycled,
-                    Correction::Springs(distance) => {
-                        exactness.note_springs(distance);
-                        break (0.0, report.norm);
-                    }
-                    Correction::Set(changes) => break (changes, report.norm),
-                }
+            let of_set = Limits { relative, reference: None, absolute: goal, drop: 0.0, ..*limits };
+            let change = match self.solve_on_set(face, solver, &mut wish, exactness.turns_for_ever(), &of_set) {
+                ControlFlow::Continue(change) => change,
+                ControlFlow::Break(outcome) => return outcome,
             };
             solver.forget();
             let complete = face.restrict(&mut self.kept, &self.slides);
@@ -187,16 +169,17 @@ impl Run<'_> {
             if !complete {
                 return Outcome::Cycled;
             }
-            if norm <= goal && goal > floor && changes <= self.few {
+            if change.norm <= goal && goal > floor && change.rows <= self.few {
                 return Outcome::Converged;
             }
             wish.copy_from_slice(&self.x);
             self.slides.align(&mut wish);
-            if changes == 0.0 {
-                follows += 1;
+            if change.rows == 0.0 {
+                exactness.note_springs(change.springs);
+                self.follows += 1;
                 continue;
             }
-            exactness.note(changes);
+            exactness.note(change.rows);
             if self.seen(&exactness.history) {
                 if exactness.loose == 0.0 && goal <= floor {
                     return Outcome::Cycled;
@@ -207,6 +190,41 @@ impl Run<'_> {
             exactness.history.push(self.names());
         }
         Outcome::Cycled
+    }
+
+    /// Solves on the present set until it is corrected, or to an end. Discs fix their unknowns elsewhere on the way. Where slips turn
+    /// `for_ever` nothing turns once more. `limits` count the products of all sets.
+    fn solve_on_set(
+        &mut self,
+        face: &mut dyn Face,
+        solver: &mut Pcpg,
+        wish: &mut [f64],
+        for_ever: bool,
+        limits: &Limits,
+    ) -> ControlFlow<Outcome, Change> {
+        let goal = limits.absolute;
+        loop {
+            let limits = Limits { products: limits.products.saturating_sub(self.statistics.hessian), ..*limits };
+            let report = solver.solve(face, &mut self.x, &mut self.residual, &limits);
+            self.statistics += report.statistics;
+            if report.outcome != Outcome::Converged {
+                return ControlFlow::Break(report.outcome);
+            }
+            let doubt = if for_ever { 0.0 } else { goal.max(DOUBT * report.norm) };
+            match self.correct(face, [goal, doubt], report.norm) {
+                Correction::None if report.norm <= goal => return ControlFlow::Break(Outcome::Converged),
+                Correction::None => {}
+                Correction::Shift if self.follows < FOLLOWS => {
+                    self.follows += 1;
+                    self.statistics.sets += 1;
+                    wish.copy_from_slice(&self.x);
+                    self.move_to(face, wish);
+                    solver.descend(&mut self.x, &mut self.residual);
+                }
+                Correction::Shift => return ControlFlow::Break(Outcome::Cycled),
+                Correction::Set(change) => return ControlFlow::Continue(change),
+            }
+        }
     }
 
     /// Moves x as near to `wish` as the set allows. Costs one product, none if x is there already.
@@ -253,8 +271,8 @@ impl Run<'_> {
             self.work[i] = f64::from(changes);
         }
         if !self.has_discs {
-            let changes = self.space.dot(&self.work, &self.work);
-            return if changes > 0.0 { Correction::Set(changes) } else { Correction::None };
+            let rows = self.space.dot(&self.work, &self.work);
+            return if rows > 0.0 { Correction::Set(Change { rows, springs: 0.0, norm }) } else { Correction::None };
         }
         let next = self.slides.next(&self.x, &moved, [tolerance, doubt]);
         let [mut fixed, mut hung] = [(); 2].map(|()| vec![0.0; self.x.len()]);
@@ -265,7 +283,7 @@ impl Run<'_> {
             self.slides.add_compliance(1.0, &self.x, &mut self.residual);
             self.slides.take(next);
             self.slides.mark(&mut self.kept);
-            return if d[0] > 0.0 { Correction::Set(d[0]) } else { Correction::Springs(springs) };
+            return Correction::Set(Change { rows: d[0], springs, norm });
         }
         if d[1].sqrt() > enough {
             self.slides.shift(&next);
@@ -292,10 +310,18 @@ enum Correction {
     None,
     /// Discs fix their unknowns elsewhere; matrix and set stay as they are.
     Shift,
-    /// Springs across slips are others; with what that moves the residual by.
-    Springs(f64),
-    /// The set is another one; with the number of bounds and discs that changed theirs.
-    Set(f64),
+    /// The set is another one, or springs are.
+    Set(Change),
+}
+
+/// How a set became another one, on all ranks.
+struct Change {
+    /// How many bounds and discs changed theirs; zero if springs alone are others.
+    rows: f64,
+    /// What springs across slips moved the residual by.
+    springs: f64,
+    /// Norm of the projected residual before.
+    norm: f64,
 }
 
 #[cfg(test)]

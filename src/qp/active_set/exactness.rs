@@ -5,6 +5,9 @@
 //! the problems are solved to the tolerance where stiffness jumps, more exactly after a correction that is much larger than an earlier
 //! one, and more exactly for good when corrections do not become smaller for long, or a set comes back, to the tolerance in the end. A
 //! set that comes back lowers the tolerance of the program too, as far as that of the scene.
+//!
+//! Slips may also turn to and fro on one set, where discs are small beside the tolerance. Their springs tell: corrections of these do not
+//! become smaller.
 
 /// Factor by which the residual drops between two looks at the set.
 pub(super) const LOOSE: f64 = 0.4;
@@ -14,7 +17,7 @@ pub(super) const TIGHTER: f64 = 0.1;
 const LEAST: f64 = 1e-3;
 /// A correction that changes this many times more rows than the smallest so far: sets are corrected too early.
 const GROWTH: f64 = 1.3;
-/// A correction of springs that is not below this share of the last one: springs are corrected too early.
+/// A correction of springs that is not below this share of the last one: springs do not settle.
 const SETTLING: f64 = 0.7;
 /// So many of them one after the other: slips turn to and fro.
 const TURNS: usize = 3;
