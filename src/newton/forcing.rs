@@ -19,6 +19,8 @@ pub const TIGHTEST: f64 = 1e-4;
 const SHARE: f64 = 0.9;
 /// ... and the power, the golden ratio.
 const POWER: f64 = 1.618;
+/// Changes of a tangent's entries over the rate of Newton's method with the old one: a rate of 0.12 was seen where they were below 0.03.
+const STALE: f64 = 0.3;
 /// How much more exactly a step is solved again.
 const AGAIN: f64 = 0.01;
 /// The floor in the beginning: at the scene's tolerance itself the last true residual is just above the one that is enough, more
@@ -36,8 +38,8 @@ pub struct Forcing {
     pub drop: f64,
     /// ... but not below the scene's tolerance times this.
     pub floor: f64,
-    /// Reduction of the true residual that is still needed. A tangent whose entries have changed by less, relative to its
-    /// diagonal, is not renewed: Newton's method with the old one converges at that rate at least.
+    /// A tangent whose entries have changed by less, relative to its diagonal, is not renewed: Newton's method with the old one
+    /// reduces the residual by what is still needed.
     pub left: f64,
 }
 
@@ -52,7 +54,7 @@ impl Forcing {
     /// relative, which is not for a program to mend.
     pub fn update(&mut self, (before, after): (f64, f64), wanted: f64, (at_floor, local): (bool, f64)) {
         let ratio = after / before;
-        self.left = (wanted / after).min(LOOSEST);
+        self.left = STALE * (wanted / after).min(LOOSEST);
         self.drop = (SHARE * ratio.powf(POWER)).clamp(TIGHTEST, LOOSEST);
         if at_floor && after > wanted.max(LOCAL * local * before) {
             self.floor *= (MARGIN * wanted / after).max(TIGHTEST);
@@ -75,11 +77,11 @@ mod tests {
     fn accuracy_follows_the_residual() {
         let mut forcing = Forcing::first(None);
         forcing.update((1.0, 0.5), 1e-6, (false, 0.0));
-        assert_eq!(forcing, Forcing { drop: LOOSEST, floor: FLOOR, left: 2e-6 });
+        assert_eq!(forcing, Forcing { drop: LOOSEST, floor: FLOOR, left: STALE * 2e-6 });
         forcing.update((0.5, 0.05), 1e-6, (false, 0.0));
         assert!((forcing.drop - SHARE * 0.1_f64.powf(POWER)).abs() < 1e-15);
         forcing.update((0.05, 1e-5), 1e-6, (true, 0.0));
-        assert_eq!((forcing.drop, forcing.left), (TIGHTEST, LOOSEST));
+        assert_eq!((forcing.drop, forcing.left), (TIGHTEST, STALE * LOOSEST));
         assert!((forcing.floor - FLOOR * 0.1 * MARGIN).abs() < 1e-15);
     }
 
