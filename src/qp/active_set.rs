@@ -30,6 +30,8 @@ use super::{Limits, Outcome, Statistics, axpy};
 const SETS: usize = 60;
 /// How often directions and radii of discs are followed at most.
 const FOLLOWS: usize = 100;
+/// The gap of one row may be violated by so much of the tolerance, which is for the norm of all rows.
+const OF_ONE: f64 = 0.1;
 /// What slides by less than this share of the residual may slide the other way.
 const DOUBT: f64 = 0.2;
 /// A move of x smaller than this, relative to x, is rounding.
@@ -210,8 +212,9 @@ impl Run<'_> {
             if report.outcome != Outcome::Converged {
                 return ControlFlow::Break(report.outcome);
             }
-            let doubt = if for_ever { 0.0 } else { goal.max(DOUBT * report.norm) };
-            match self.correct(face, [goal, doubt], report.norm) {
+            let gap = OF_ONE * goal;
+            let doubt = if for_ever { 0.0 } else { gap.max(DOUBT * report.norm) };
+            match self.correct(face, [gap, doubt], report.norm) {
                 Correction::None if report.norm <= goal => return ControlFlow::Break(Outcome::Converged),
                 Correction::None => {}
                 Correction::Shift if self.follows < FOLLOWS => {

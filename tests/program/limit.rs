@@ -104,28 +104,46 @@ fn the_weakest_part_decides() {
     assert!((lower / wanted - 1.0).abs() < 1e-2 && (upper / wanted - 1.0).abs() < 1e-2, "{lower} to {upper}");
 }
 
-/// A soft cantilever on an elastic one of the same size: that bears everything, and no limit is told.
-#[test]
-fn elastic_parts_know_no_limit() {
-    let mut text = String::from(
-        "material.soft = { young = 1e5, poisson = 0.3, yield_stress = 240.0 }\nmaterial.hard = { young = 1e5, poisson = 0.3 }\n\
-         load.top = { surface = \"soft.zmax\", pressure = 1.0 }\nlimit = {}\n\
-         contact.joint = { slave = \"soft.zmin\", master = \"hard.zmax\" }\n",
+/// A soft cantilever and an elastic one of the same size, one on the other, with a pressure of 1 on the upper one.
+fn cantilevers(upper: &str, lower: &str) -> String {
+    let mut text = format!(
+        "material.soft = {{ young = 1e5, poisson = 0.3, yield_stress = 240.0 }}\n\
+         material.hard = {{ young = 1e5, poisson = 0.3 }}\n\
+         load.top = {{ surface = \"{upper}.zmax\", pressure = 1.0 }}\nlimit = {{}}\n\
+         contact.joint = {{ slave = \"soft.{}\", master = \"hard.{}\" }}\n",
+        if upper == "soft" { "zmin" } else { "zmax" },
+        if upper == "soft" { "zmax" } else { "zmin" },
     );
-    for (body, z) in [("soft", 1.0), ("hard", 0.0)] {
+    for (body, z) in [(upper, 1.0), (lower, 0.0)] {
         text += &format!(
             "[body.{body}]\nmaterial = \"{body}\"\nelement = \"hex8\"\n\
              brick = {{ origin = [0.0, 0.0, {z:?}], size = [6.0, 1.0, 1.0], cells = [6, 1, 1] }}\n\
              [support.{body}]\nsurface = \"{body}.xmin\"\nfix = [\"x\", \"y\", \"z\"]\n"
         );
     }
+    text
+}
+
+/// The elastic cantilever above bears everything, whatever the soft one below does: no limit is told.
+#[test]
+fn elastic_parts_know_no_limit() {
     let directory = tempfile::tempdir().unwrap();
-    let run = solve(1, &scene_file(directory.path(), &text), &[]);
+    let run = solve(1, &scene_file(directory.path(), &cantilevers("hard", "soft")), &[]);
     assert_eq!(run.code, 1);
     let summary = run.summary();
     assert!(summary["converged"] == false && summary["error"].as_str().unwrap().contains("the last bounds are"));
     let limit = &summary["limit_load"];
     assert!(number(limit, "upper") > 1.5 * number(limit, "lower"), "{limit}");
+}
+
+/// The soft cantilever above is squeezed on the elastic one. Uniaxial compression up to the yield stress is a lower bound; the support
+/// at the end of a beam of six times its height adds little.
+#[test]
+fn soft_parts_are_squeezed_on_elastic_ones() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = solve(1, &scene_file(directory.path(), &cantilevers("soft", "hard")), &[]);
+    let [lower, upper, _] = bounds(&run.converged().summary(), 0.01);
+    assert!(lower > 240.0 && upper < 1.02 * 240.0, "{lower} to {upper}");
 }
 
 /// Of a mesh of 18 tetrahedra that is refined, the limit comes near the closed form from above, as it must.
