@@ -110,9 +110,7 @@ fn cantilevers(upper: &str, lower: &str) -> String {
         "material.soft = {{ young = 1e5, poisson = 0.3, yield_stress = 240.0 }}\n\
          material.hard = {{ young = 1e5, poisson = 0.3 }}\n\
          load.top = {{ surface = \"{upper}.zmax\", pressure = 1.0 }}\nlimit = {{}}\n\
-         contact.joint = {{ slave = \"soft.{}\", master = \"hard.{}\" }}\n",
-        if upper == "soft" { "zmin" } else { "zmax" },
-        if upper == "soft" { "zmax" } else { "zmin" },
+         contact.joint = {{ slave = \"{upper}.zmin\", master = \"{lower}.zmax\" }}\n",
     );
     for (body, z) in [(upper, 1.0), (lower, 0.0)] {
         text += &format!(
