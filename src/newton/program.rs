@@ -21,6 +21,9 @@ use crate::scene::Qp;
 
 /// Of a residual its projection cannot tell more than this share, and surely less than a tenth of it.
 const ROUNDING: f64 = 1e-14;
+/// As long as all projections are below this share of their residuals, they may be nothing but rounding: bodies move without strain, or
+/// as the coarse problem tells already. 1.2e-13 was seen of bricks 40 times as long as thick.
+const UNSTRAINED: f64 = 1e-12;
 
 /// A program that is not the last may leave this share of contacts on the wrong set: the next one corrects them along with its own.
 const ASTRAY: f64 = 0.1;
@@ -41,7 +44,7 @@ pub struct ProgramSettings {
 pub struct ProgramState {
     /// Rows that the last program kept: its multipliers are zero elsewhere. `None`: the next one starts from scratch.
     pub kept: Option<Vec<bool>>,
-    /// The largest first residual of a solve so far.
+    /// The largest first residual of a solve so far that was more than rounding.
     pub reference: Option<f64>,
     /// Whether the next program is the first of a solve.
     pub first: bool,
@@ -56,7 +59,7 @@ pub struct Programs {
     face: Option<CoarseFace>,
     /// What friction does on these rows.
     slides: Slides,
-    /// The largest first residual of a solve so far.
+    /// The largest first residual of a solve so far that was more than rounding.
     reference: Option<f64>,
     /// Whether the next program is the first of a solve.
     first: bool,
@@ -151,36 +154,30 @@ impl Programs {
     pub fn solve(
         &mut self,
         problem: &TornProblem,
-        mut dual: Dual,
+        dual: Dual,
         resultants: &[f64],
         from: Rest,
         forcing: Forcing,
     ) -> Result<DualSolution, Floating> {
-        // Where all residuals so far are rounding, bodies move without strain.
-        let rounding = ROUNDING * Multipliers(problem.space, dual.timer).norm(&from.residual);
-        let is_strained = self.reference.is_some_and(|reference| reference > rounding);
+        let size = Multipliers(problem.space, dual.timer).norm(&from.residual);
+        let (absolute, rounding) = match self.reference {
+            None => (ROUNDING, UNSTRAINED),
+            Some(_) => (0.1 * ROUNDING, 0.0),
+        };
         let limits = Limits {
             relative: self.settings.tolerance * forcing.floor,
             reference: self.reference,
-            absolute: if is_strained { 0.1 * rounding } else { rounding },
+            absolute: absolute * size,
+            rounding: rounding * size,
             drop: forcing.drop,
             products: self.settings.products.saturating_sub(from.spent),
         };
-        if !problem.constraints.has_inequalities {
-            return Ok(self.equalities(problem, dual, resultants, from, limits));
-        }
-        let mut wasted = Statistics::default();
-        let (lambda, b) = (from.start.clone(), from.residual.clone());
-        if self.settings.method == Qp::ActiveSet {
-            let found = self.active_set(problem, &mut dual, resultants, from, limits);
-            if found.outcome != Outcome::Cycled {
-                return Ok(found);
-            }
-            wasted = found.statistics;
-            dual.restrict_scaling(problem.constraints, &vec![true; b.len()]);
-        }
-        let mut found = self.smalse(problem, dual, lambda, b, limits)?;
-        found.statistics += wasted;
+        let (mut found, first) = if problem.constraints.has_inequalities {
+            self.inequalities(problem, dual, resultants, from, limits)?
+        } else {
+            self.on_face((problem, dual, resultants), from, None, limits)
+        };
+        found.at_floor = self.note(&limits, first);
         Ok(found)
     }
 
@@ -199,17 +196,29 @@ impl Programs {
         self.face.take().unwrap_or_else(|| self.on_slides(coarse, vec![true; rows]))
     }
 
-    fn equalities(
+    /// Solves the program by the method asked for, and by SMALSE-M where the sets come back. Returns the norm of the first projected
+    /// residual as well. Collective.
+    fn inequalities(
         &mut self,
         problem: &TornProblem,
-        dual: Dual,
+        mut dual: Dual,
         resultants: &[f64],
         from: Rest,
         limits: Limits,
-    ) -> DualSolution {
-        let (mut found, first_norm) = self.on_face((problem, dual, resultants), from, None, limits);
-        found.at_floor = self.note(&limits, first_norm);
-        found
+    ) -> Result<(DualSolution, f64), Floating> {
+        let mut wasted = Statistics::default();
+        let (lambda, b) = (from.start.clone(), from.residual.clone());
+        if self.settings.method == Qp::ActiveSet {
+            let (found, first_norm) = self.active_set(problem, &mut dual, resultants, from, limits);
+            if found.outcome != Outcome::Cycled {
+                return Ok((found, first_norm));
+            }
+            wasted = found.statistics;
+            dual.restrict_scaling(problem.constraints, &vec![true; b.len()]);
+        }
+        let (mut found, first_norm) = self.smalse(problem, dual, lambda, b, limits)?;
+        found.statistics += wasted;
+        Ok((found, first_norm))
     }
 
     /// Solves the program on the rows that the last one kept, all of them equalities. Directions that are `known` to be conjugate in
@@ -251,7 +260,7 @@ impl Programs {
         resultants: &[f64],
         Rest { start: x, residual, directions, spent }: Rest,
         limits: Limits,
-    ) -> DualSolution {
+    ) -> (DualSolution, f64) {
         let space = Multipliers(problem.space, dual.timer);
         let bounded = problem.constraints.may_open();
         let rows = dual.timer.time("coarse set-up", || self.take_face(dual.coarse, bounded.len()));
@@ -262,7 +271,7 @@ impl Programs {
         if !timer.time("coarse set-up", || face.complete(&mut kept)) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
             let (lambda, balanced) = (Vec::new(), Vec::new());
-            return DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest: None };
+            return (DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest: None }, f64::NAN);
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
         face.slides.adopt(&kept);
@@ -270,8 +279,8 @@ impl Programs {
             (face.slides.clone(), problem.constraints.has_friction, problem.constraints.uneven);
         let start = active_set::Guess { x, residual, kept, slides, has_discs, uneven, astray: ASTRAY, directions };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
-        let at_floor = self.note(&limits, solution.first_norm);
-        let active_set::Solution { x: balanced, residual, slides, outcome, statistics, directions, .. } = solution;
+        let active_set::Solution { x: balanced, residual, slides, outcome, statistics, first_norm, directions, .. } =
+            solution;
         self.slides = slides;
         let spent = spent + statistics.hessian;
         let rest = Some(Rest { start: balanced.clone(), residual, directions, spent });
@@ -279,7 +288,7 @@ impl Programs {
         problem.laws().project(&mut lambda);
         let DualFace { dual, rows, .. } = face;
         self.face = Some(dual.timer.time("coarse set-up", || rows.settled(dual.coarse)));
-        DualSolution { lambda, balanced, outcome, statistics, at_floor, rest }
+        (DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest }, first_norm)
     }
 
     fn smalse(
@@ -289,7 +298,7 @@ impl Programs {
         start: Vec<f64>,
         b: Vec<f64>,
         mut limits: Limits,
-    ) -> Result<DualSolution, Floating> {
+    ) -> Result<(DualSolution, f64), Floating> {
         let (timer, coarse) = (dual.timer, dual.coarse);
         let space = Multipliers(problem.space, timer);
         let projector = timer.time("coarse set-up", || coarse.projector())?;
@@ -298,7 +307,7 @@ impl Programs {
         let mean = timer.time("coarse problem", || projector.project(&mut projected));
         let mut statistics = Statistics::default();
         let mut x = vec![0.0; b.len()];
-        let (mut outcome, mut at_floor) = (Outcome::Converged, true);
+        let (mut outcome, mut first_norm) = (Outcome::Converged, 0.0);
         let size = space.norm(&projected);
         if size != 0.0 {
             if self.norm.is_none() {
@@ -307,8 +316,10 @@ impl Programs {
                 self.norm = estimate.map(|e| e.norm);
             }
             // The first program of all refers to the residual on all rows, as the active set's does.
-            limits.reference.get_or_insert(size);
-            self.reference.get_or_insert(size);
+            if self.reference.is_none() && size > limits.rounding {
+                self.reference = Some(size);
+            }
+            limits.reference = self.reference;
             limits.products = limits.products.saturating_sub(statistics.hessian);
             let program = radii::Program {
                 space: &space,
@@ -322,9 +333,8 @@ impl Programs {
                 multiplier: self.face.as_ref().map(|face| first_multiplier(face, coarse, &b, &mean)),
             };
             let found = radii::solve(program, &mut self.slides, limits);
-            at_floor = self.note(&limits, found.first_norm);
             statistics += found.statistics;
-            (x, outcome) = (found.x, found.outcome);
+            (x, outcome, first_norm) = (found.x, found.outcome, found.first_norm);
         } else {
             let radii = self.slides.radii(&start);
             self.slides.settle(&start, &radii);
@@ -335,19 +345,20 @@ impl Programs {
         problem.laws().project(&mut lambda);
         let kept = problem.laws().kept(&lambda, 0.0);
         self.face = Some(timer.time("coarse set-up", || self.on_slides(coarse, kept)));
-        Ok(DualSolution { lambda, balanced, outcome, statistics, at_floor, rest: None })
+        Ok((DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest: None }, first_norm))
     }
 
     /// Takes the `first` residual of a program down as the reference of all tolerances, if it is that of the first program
-    /// of a solve and larger than those of earlier solves. Returns whether the program was to be solved to the tolerance
-    /// of the scene.
+    /// of a solve and larger than those of earlier solves, or the first of all that is more than rounding. Returns whether the
+    /// program was to be solved to the tolerance of the scene.
     fn note(&mut self, limits: &Limits, first: f64) -> bool {
-        let reference = match self.reference {
-            Some(before) if self.first => before.max(first),
-            before => before.unwrap_or(first),
-        };
-        (self.reference, self.first) = (Some(reference), false);
-        limits.relative * reference >= limits.drop * first
+        match &mut self.reference {
+            Some(reference) if self.first => *reference = reference.max(first),
+            Some(_) => {}
+            None => self.reference = (first > limits.rounding).then_some(first),
+        }
+        self.first = false;
+        limits.relative * self.reference.unwrap_or(first) >= limits.drop * first
     }
 }
 

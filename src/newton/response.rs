@@ -59,8 +59,14 @@ impl StepSolver<'_> {
 
         // What rigid motions close leaves nothing but rounding.
         let absolute = ROUNDING * problem.space.dots(&[(&residual, &residual)])[0].sqrt();
-        let limits =
-            Limits { relative: drop, reference: None, absolute, drop: 0.0, products: self.programs.products() };
+        let limits = Limits {
+            relative: drop,
+            reference: None,
+            absolute,
+            rounding: 0.0,
+            drop: 0.0,
+            products: self.programs.products(),
+        };
         let dual = Dual {
             operator: &mut self.operator,
             coarse: &self.coarse,

@@ -159,7 +159,7 @@ impl Run<'_> {
                 limits.target(self.first_norm)
             });
             let relative = exactness.take_relative();
-            let of_set = Limits { relative, reference: None, absolute: goal, drop: 0.0, ..*limits };
+            let of_set = Limits { relative, reference: None, absolute: goal, rounding: 0.0, drop: 0.0, ..*limits };
             let change = match self.solve_on_set(face, solver, &mut wish, exactness.turns_for_ever(), &of_set) {
                 ControlFlow::Continue(change) => change,
                 ControlFlow::Break(outcome) => return outcome,

@@ -80,7 +80,7 @@ impl std::ops::AddAssign for Statistics {
     }
 }
 
-/// When to stop: a gradient norm of `max(relative * reference, absolute)` is small enough.
+/// When to stop: a gradient norm of `max(relative * reference, absolute, drop * first)` is small enough.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Tolerance relative to the reference.
@@ -89,6 +89,8 @@ pub struct Limits {
     pub reference: Option<f64>,
     /// Tolerance in the units of the gradient.
     pub absolute: f64,
+    /// The tolerance where the first gradient norm is below it: what there is may be nothing but rounding.
+    pub rounding: f64,
     /// Tolerance relative to the gradient norm at the start: to reduce it by this factor is enough. 0 to reach the other
     /// tolerances.
     pub drop: f64,
@@ -99,7 +101,8 @@ pub struct Limits {
 impl Limits {
     /// The gradient norm to reach from `first`.
     pub fn target(&self, first: f64) -> f64 {
-        (self.relative * self.reference.unwrap_or(first)).max(self.absolute).max(self.drop * first)
+        let absolute = if first <= self.rounding { self.rounding } else { self.absolute };
+        (self.relative * self.reference.unwrap_or(first)).max(absolute).max(self.drop * first)
     }
 }
 

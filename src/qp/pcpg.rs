@@ -235,7 +235,8 @@ mod tests {
     use super::super::tests::dense::{Joined, Matrix, Null, Plain, Random, distance, dot, enumerate};
     use super::*;
 
-    const LIMITS: Limits = Limits { relative: 1e-10, reference: None, absolute: 0.0, drop: 0.0, products: 1000 };
+    const LIMITS: Limits =
+        Limits { relative: 1e-10, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 1000 };
 
     fn run(a: &mut Matrix, null: &mut Null, m: Option<&mut Matrix>, b: &[f64], x: &mut [f64]) -> Report {
         let mut residual: Vec<f64> = a.times(x).iter().zip(b).map(|(ax, b)| b - ax).collect();

@@ -3,7 +3,7 @@
 //! `sigma/E + kappa` along a uniaxial stress and `-nu sigma/E - kappa/2` across it, `kappa = (q - sigma_y)/H`.
 
 use crate::common::fields::{EXACT, Fields, assert_displacement, assert_uniform};
-use crate::common::{Run, assert_close, number, solve, solve_tightly, vector};
+use crate::common::{Run, assert_close, number, scene_file, solve, solve_tightly, vector};
 
 const YOUNG: f64 = 210_000.0;
 const POISSON: f64 = 0.29;
@@ -53,6 +53,28 @@ fn a_bar_stretches_by_the_closed_form_below_and_beyond_yield() {
     let (along, across, _) = uniaxial(600.0);
     assert_close("strain along", along, 1.785714285714e-2, 1e-12);
     assert_close("strain across", across, -8.328571428571e-3, 1e-12);
+}
+
+/// Every element is a subdomain, and the coarse problem tells the solution: what is left for the programs is rounding. No increment
+/// takes that for a load.
+#[test]
+fn where_the_coarse_problem_tells_all_the_programs_end_at_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = scene_file(
+        directory.path(),
+        "step = [{ increments = 2 }, { amplitude = -0.2 }]\nmaterial.m = { young = 210000.0, poisson = 0.0 }\n\
+         support.s = { surface = \"b.zmin\", fix = [\"x\", \"y\", \"z\"] }\n\
+         load.l = { surface = \"b.zmax\", traction = [0.0, 0.0, -100.0] }\n\
+         [body.b]\nmaterial = \"m\"\nelement = \"hex8\"\n\
+         brick = { origin = [0.0, 0.0, 0.0], size = [4.0, 4.0, 2.0], cells = [2, 1, 3] }\n",
+    );
+    for precision in ["double", "mixed"] {
+        let precision = format!("solver.precision={precision}");
+        let summary = tightly(&path, &["decomposition.cells=[1, 1, 1]", &precision]).summary();
+        // -(sigma^2/2E) V
+        assert_close("energy", number(&summary, "energy"), -20.0 * 20.0 / (2.0 * YOUNG) * 32.0, 1e-12);
+        assert!(number(&summary, "hessian_multiplications") < 60.0, "{}", summary["steps"]);
+    }
 }
 
 #[test]

@@ -5,7 +5,8 @@ use super::super::tests::dense::{Plain, distance, dot};
 use super::super::tests::torn::{Torn, homogenised};
 use super::*;
 
-const LIMITS: Limits = Limits { relative: 1e-8, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
+const LIMITS: Limits =
+    Limits { relative: 1e-8, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 2000 };
 
 fn from(torn: &mut Torn, x: Vec<f64>, kept: Vec<bool>, limits: &Limits) -> Solution {
     from_with(torn, (x, kept), 0.0, limits)

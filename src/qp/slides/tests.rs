@@ -7,7 +7,8 @@ use super::super::tests::dense::{Matrix, Plain, Random, distance, dot};
 use super::super::{Limits, Outcome};
 use super::*;
 
-const LIMITS: Limits = Limits { relative: 1e-10, reference: None, absolute: 0.0, drop: 0.0, products: 5000 };
+const LIMITS: Limits =
+    Limits { relative: 1e-10, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 5000 };
 
 /// A dense matrix on what a set leaves free.
 struct Dense {

@@ -1,7 +1,8 @@
 use super::*;
 use crate::qp::tests::dense::{Joined, Matrix, Null, OnFaces, Plain, Random, distance, dot, enumerate};
 
-const LIMITS: Limits = Limits { relative: 1e-9, reference: None, absolute: 0.0, drop: 0.0, products: 4000 };
+const LIMITS: Limits =
+    Limits { relative: 1e-9, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 4000 };
 const NONE: f64 = f64::NEG_INFINITY;
 
 struct Case {

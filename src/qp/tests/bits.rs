@@ -28,7 +28,7 @@ fn membrane(set: impl Fn(Vec<f64>) -> FeasibleSet) -> Solution {
     let rows = (0..3).map(|k| (0..n).map(|i| if i % 7 == k { random.next() } else { 0.0 }).collect()).collect();
     let b: Vec<f64> = (0..n).map(|i| if i < n / 3 { 60.0 } else { -40.0 } + 30.0 * random.next()).collect();
     let set = set(vec![-0.4; n]);
-    let limits = Limits { relative: 1e-7, reference: None, absolute: 0.0, drop: 0.0, products: 3000 };
+    let limits = Limits { relative: 1e-7, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 3000 };
     let function = &mut Joined(&mut a, &mut Null::of(rows), None);
     let problem = Problem { space: &Plain, function, b: &b, set: &set };
     solve(problem, &Settings { limits, norm }, Start { x: vec![-0.4; n], multiplier: None })

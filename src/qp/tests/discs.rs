@@ -7,7 +7,8 @@ use crate::qp::feasible::FeasibleSet;
 use crate::qp::smalse::{Problem, Settings, Solution, Start, solve};
 use crate::qp::{Limits, Outcome, axpy};
 
-const LIMITS: Limits = Limits { relative: 1e-9, reference: None, absolute: 0.0, drop: 0.0, products: 5000 };
+const LIMITS: Limits =
+    Limits { relative: 1e-9, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 5000 };
 const NONE: f64 = f64::NEG_INFINITY;
 
 struct Case {

@@ -10,7 +10,8 @@ use crate::qp::quadratic::{Quadratic, Space};
 use crate::qp::smalse::{Problem, Settings, Solution, Start, solve};
 use crate::qp::{Limits, Outcome};
 
-const LIMITS: Limits = Limits { relative: 1e-9, reference: None, absolute: 0.0, drop: 0.0, products: 1000 };
+const LIMITS: Limits =
+    Limits { relative: 1e-9, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 1000 };
 const HALF: usize = 12;
 const SETTINGS: Settings = Settings { limits: LIMITS, norm: 1.0 };
 

@@ -245,7 +245,7 @@ pub fn homogenised(torn: &mut Torn, relative: f64) -> Solution {
     let b: Vec<f64> = torn.f.times(&shift).iter().zip(&torn.d).map(|(fx, d)| d - fx).collect();
     let lower = shift.iter().zip(&torn.bounded).map(|(s, b)| if *b { -s } else { f64::NEG_INFINITY }).collect();
     let norm = power::norm(&Plain, torn, &b).expect("an estimate").norm;
-    let limits = Limits { relative, reference: None, absolute: 0.0, drop: 0.0, products: 2000 };
+    let limits = Limits { relative, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 2000 };
     let settings = Settings { limits, norm };
     let problem = Problem { space: &Plain, function: torn, b: &b, set: &FeasibleSet::above(lower) };
     let mut found = solve(problem, &settings, Start { x: vec![0.0; n], multiplier: None });
