@@ -212,9 +212,8 @@ impl Run<'_> {
             if report.outcome != Outcome::Converged {
                 return ControlFlow::Break(report.outcome);
             }
-            let gap = OF_ONE * goal;
-            let doubt = if for_ever { 0.0 } else { gap.max(DOUBT * report.norm) };
-            match self.correct(face, [gap, doubt], report.norm) {
+            let doubt = if for_ever { 0.0 } else { (OF_ONE * goal).max(DOUBT * report.norm) };
+            match self.correct(face, [goal, doubt], report.norm) {
                 Correction::None if report.norm <= goal => return ControlFlow::Break(Outcome::Converged),
                 Correction::None => {}
                 Correction::Shift if self.follows < FOLLOWS => {
@@ -256,10 +255,11 @@ impl Run<'_> {
         self.space.norm(&self.work)
     }
 
-    /// Lets rows of negative force go and takes rows of violated gap in, and corrects discs. The tolerance of gaps keeps rows that have
-    /// neither force nor gap from coming and going; what slides against its friction by less than `doubt` does not. Where the set is
-    /// another one `residual` is without springs afterwards.
-    fn correct(&mut self, face: &mut dyn Face, [tolerance, doubt]: [f64; 2], norm: f64) -> Correction {
+    /// Lets rows of negative force go and takes rows of violated gap in, and corrects discs. A tolerance of gaps, part of the `goal` of
+    /// all rows, keeps rows that have neither force nor gap from coming and going; what slides against its friction by less than
+    /// `doubt` does not. Where the set is another one `residual` is without springs afterwards.
+    fn correct(&mut self, face: &mut dyn Face, [goal, doubt]: [f64; 2], norm: f64) -> Correction {
+        let tolerance = OF_ONE * goal;
         self.work.copy_from_slice(&self.residual);
         face.gaps(&mut self.work);
         let mut moved = Vec::new();
@@ -281,7 +281,7 @@ impl Run<'_> {
         let [mut fixed, mut hung] = [(); 2].map(|()| vec![0.0; self.x.len()]);
         self.slides.compare(&next, &self.x, [&mut self.work, &mut fixed, &mut hung]);
         let d = self.space.dots(&[(&self.work, &self.work), (&fixed, &fixed), (&hung, &hung)]);
-        let (enough, springs) = (norm.max(tolerance), d[2].sqrt());
+        let (enough, springs) = (norm.max(goal), d[2].sqrt());
         if d[0] > 0.0 || springs > enough {
             self.slides.add_compliance(1.0, &self.x, &mut self.residual);
             self.slides.take(next);
