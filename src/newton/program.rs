@@ -13,7 +13,7 @@ use super::radii;
 use super::solution::{DualSolution, Rest};
 use crate::feti::coarse::face::CoarseFace;
 use crate::feti::coarse::{Coarse, Floating};
-use crate::qp::pcpg::{Directions, Pcpg};
+use crate::qp::pcpg::{Directions, Pcpg, Report};
 use crate::qp::quadratic::{Quadratic, Space};
 use crate::qp::slides::{Disc, Slides};
 use crate::qp::{Limits, Outcome, Statistics, active_set, power};
@@ -147,7 +147,7 @@ impl Programs {
     }
 
     /// Solves the program with these `resultants` `e` from such multipliers, or solves on. [`Programs::face`] has the kept rows
-    /// afterwards. Collective.
+    /// afterwards. Says whether it was solved to the tolerance of the scene as well. Collective.
     ///
     /// # Errors
     /// If these rows leave a rigid motion free.
@@ -158,7 +158,7 @@ impl Programs {
         resultants: &[f64],
         from: Rest,
         forcing: Forcing,
-    ) -> Result<DualSolution, Floating> {
+    ) -> Result<(DualSolution, bool), Floating> {
         let size = Multipliers(problem.space, dual.timer).norm(&from.residual);
         let (absolute, rounding) = match self.reference {
             None => (ROUNDING, UNSTRAINED),
@@ -172,13 +172,13 @@ impl Programs {
             drop: forcing.drop,
             products: self.settings.products.saturating_sub(from.spent),
         };
-        let (mut found, first) = if problem.constraints.has_inequalities {
+        let found = if problem.constraints.has_inequalities {
             self.inequalities(problem, dual, resultants, from, limits)?
         } else {
             self.on_face((problem, dual, resultants), from, None, limits)
         };
-        found.at_floor = self.note(&limits, first);
-        Ok(found)
+        let at_floor = self.note(&limits, found.first_norm);
+        Ok((found, at_floor))
     }
 
     /// What friction does on them.
@@ -196,8 +196,7 @@ impl Programs {
         self.face.take().unwrap_or_else(|| self.on_slides(coarse, vec![true; rows]))
     }
 
-    /// Solves the program by the method asked for, and by SMALSE-M where the sets come back. Returns the norm of the first projected
-    /// residual as well. Collective.
+    /// Solves the program by the method asked for, and by SMALSE-M where the sets come back. Collective.
     fn inequalities(
         &mut self,
         problem: &TornProblem,
@@ -205,32 +204,31 @@ impl Programs {
         resultants: &[f64],
         from: Rest,
         limits: Limits,
-    ) -> Result<(DualSolution, f64), Floating> {
+    ) -> Result<DualSolution, Floating> {
         let mut wasted = Statistics::default();
         let (lambda, b) = (from.start.clone(), from.residual.clone());
         if self.settings.method == Qp::ActiveSet {
-            let (found, first_norm) = self.active_set(problem, &mut dual, resultants, from, limits);
+            let found = self.active_set(problem, &mut dual, resultants, from, limits);
             if found.outcome != Outcome::Cycled {
-                return Ok((found, first_norm));
+                return Ok(found);
             }
             wasted = found.statistics;
             dual.restrict_scaling(problem.constraints, &vec![true; b.len()]);
         }
-        let (mut found, first_norm) = self.smalse(problem, dual, lambda, b, limits)?;
+        let mut found = self.smalse(problem, dual, lambda, b, limits)?;
         found.statistics += wasted;
-        Ok((found, first_norm))
+        Ok(found)
     }
 
     /// Solves the program on the rows that the last one kept, all of them equalities. Directions that are `known` to be conjugate in
-    /// the same `F` go first; tolerances refer to the residual before them. Returns the norm of the first projected residual as
-    /// well. Collective.
+    /// the same `F` go first; tolerances refer to the residual before them. Collective.
     pub(super) fn on_face(
         &mut self,
         (problem, dual, resultants): (&TornProblem, Dual, &[f64]),
         Rest { start: mut lambda, mut residual, mut directions, spent }: Rest,
         known: Option<Directions>,
         mut limits: Limits,
-    ) -> (DualSolution, f64) {
+    ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
         let rows = dual.timer.time("coarse set-up", || self.take_face(dual.coarse, lambda.len()));
         let slides = self.slides.clone();
@@ -247,10 +245,8 @@ impl Programs {
         let spent = spent + report.statistics.hessian;
         let rest = Rest { start: lambda.clone(), residual, directions: solver.into_directions(), spent };
         self.face = Some(face.rows);
-        let (outcome, statistics) = (report.outcome, report.statistics);
-        let found =
-            DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, at_floor: false, rest: Some(rest) };
-        (found, report.first_norm)
+        let Report { outcome, statistics, first_norm, .. } = report;
+        DualSolution { balanced: lambda.clone(), lambda, outcome, statistics, first_norm, rest: Some(rest) }
     }
 
     fn active_set(
@@ -260,7 +256,7 @@ impl Programs {
         resultants: &[f64],
         Rest { start: x, residual, directions, spent }: Rest,
         limits: Limits,
-    ) -> (DualSolution, f64) {
+    ) -> DualSolution {
         let space = Multipliers(problem.space, dual.timer);
         let bounded = problem.constraints.may_open();
         let rows = dual.timer.time("coarse set-up", || self.take_face(dual.coarse, bounded.len()));
@@ -271,7 +267,7 @@ impl Programs {
         if !timer.time("coarse set-up", || face.complete(&mut kept)) {
             let (outcome, statistics) = (Outcome::Cycled, Statistics::default());
             let (lambda, balanced) = (Vec::new(), Vec::new());
-            return (DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest: None }, f64::NAN);
+            return DualSolution { lambda, balanced, outcome, statistics, first_norm: f64::NAN, rest: None };
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
         face.slides.adopt(&kept);
@@ -288,7 +284,7 @@ impl Programs {
         problem.laws().project(&mut lambda);
         let DualFace { dual, rows, .. } = face;
         self.face = Some(dual.timer.time("coarse set-up", || rows.settled(dual.coarse)));
-        (DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest }, first_norm)
+        DualSolution { lambda, balanced, outcome, statistics, first_norm, rest }
     }
 
     fn smalse(
@@ -298,7 +294,7 @@ impl Programs {
         start: Vec<f64>,
         b: Vec<f64>,
         mut limits: Limits,
-    ) -> Result<(DualSolution, f64), Floating> {
+    ) -> Result<DualSolution, Floating> {
         let (timer, coarse) = (dual.timer, dual.coarse);
         let space = Multipliers(problem.space, timer);
         let projector = timer.time("coarse set-up", || coarse.projector())?;
@@ -316,9 +312,7 @@ impl Programs {
                 self.norm = estimate.map(|e| e.norm);
             }
             // The first program of all refers to the residual on all rows, as the active set's does.
-            if self.reference.is_none() && size > limits.rounding {
-                self.reference = Some(size);
-            }
+            self.reference = self.reference.or(limits.told(size));
             limits.reference = self.reference;
             limits.products = limits.products.saturating_sub(statistics.hessian);
             let program = radii::Program {
@@ -345,7 +339,7 @@ impl Programs {
         problem.laws().project(&mut lambda);
         let kept = problem.laws().kept(&lambda, 0.0);
         self.face = Some(timer.time("coarse set-up", || self.on_slides(coarse, kept)));
-        Ok((DualSolution { lambda, balanced, outcome, statistics, at_floor: false, rest: None }, first_norm))
+        Ok(DualSolution { lambda, balanced, outcome, statistics, first_norm, rest: None })
     }
 
     /// Takes the `first` residual of a program down as the reference of all tolerances, if it is that of the first program
@@ -355,7 +349,7 @@ impl Programs {
         match &mut self.reference {
             Some(reference) if self.first => *reference = reference.max(first),
             Some(_) => {}
-            None => self.reference = (first > limits.rounding).then_some(first),
+            None => self.reference = limits.told(first),
         }
         self.first = false;
         limits.relative * self.reference.unwrap_or(first) >= limits.drop * first

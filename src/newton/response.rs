@@ -75,8 +75,7 @@ impl StepSolver<'_> {
             timer,
             alive: &|_| {},
         };
-        let (mut found, _) =
-            self.programs.on_face((problem, dual, &e), Rest::new(lambda, residual), Some(known), limits);
+        let mut found = self.programs.on_face((problem, dual, &e), Rest::new(lambda, residual), Some(known), limits);
         let Recovered { mut du, refined, .. } =
             self.recover(problem, (&forces, &open), &mut found, drop.max(TIGHTEST), timer);
         for (du, lifted) in du.iter_mut().flatten().zip(lifted.iter().flatten().flatten()) {

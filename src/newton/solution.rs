@@ -13,8 +13,8 @@ pub struct DualSolution {
     pub outcome: Outcome,
     /// What it took.
     pub statistics: Statistics,
-    /// Whether it was solved to the tolerance of the scene.
-    pub at_floor: bool,
+    /// Norm of the projected residual that it began with.
+    pub first_norm: f64,
     /// What solving on goes on from; SMALSE-M does not.
     pub rest: Option<Rest>,
 }

@@ -212,7 +212,7 @@ impl<'a> StepSolver<'a> {
         residual.iter_mut().zip(&open).for_each(|(r, c)| *r -= c);
         let (mut from, mut forcing) = (Rest::new(lambda, residual), forcing);
         let (mut statistics, mut is_exact) = (Statistics::default(), false);
-        let (found, recovered, rest) = loop {
+        let (found, at_floor, recovered, rest) = loop {
             let dual = Dual {
                 operator: &mut self.operator,
                 coarse: &self.coarse,
@@ -222,7 +222,7 @@ impl<'a> StepSolver<'a> {
                 alive: &|applications| alive(applications - before),
             };
             let found = self.programs.solve(problem, dual, &resultants, from, forcing);
-            let mut found = found.map_err(|floating| floating.to_string())?;
+            let (mut found, at_floor) = found.map_err(|floating| floating.to_string())?;
             statistics += found.statistics;
 
             // du = K^+ (f_k - B'lambda) + R alpha.
@@ -235,11 +235,11 @@ impl<'a> StepSolver<'a> {
             is_exact = found.outcome == Outcome::Converged && stays_elastic(problem, (u, state), &recovered.du);
             match found.rest.take() {
                 // What was solved is no approximation, and worth solving on.
-                Some(rest) if goes_on && is_exact && !was_exact && !found.at_floor && !problem.is_linear() => {
+                Some(rest) if goes_on && is_exact && !was_exact && !at_floor && !problem.is_linear() => {
                     from = rest;
                     forcing.drop = (self.linear_drop() / forcing.drop).min(1.0);
                 }
-                rest => break (found, recovered, rest),
+                rest => break (found, at_floor, recovered, rest),
             }
         };
         let mut recovered = recovered;
@@ -250,7 +250,7 @@ impl<'a> StepSolver<'a> {
             preconditioner.close(problem.constraints, &slack, &kept, &mut recovered.du, timer);
         }
         let Recovered { du, local_residual, refined } = recovered;
-        let DualSolution { lambda, outcome, at_floor, .. } = found;
+        let DualSolution { lambda, outcome, .. } = found;
         let applications = self.operator.applications() - before + refined;
         let directions = rest.map(Rest::into_directions).unwrap_or_default();
         Ok(Step {

@@ -212,8 +212,7 @@ impl Run<'_> {
             if report.outcome != Outcome::Converged {
                 return ControlFlow::Break(report.outcome);
             }
-            let doubt = if for_ever { 0.0 } else { (OF_ONE * goal).max(DOUBT * report.norm) };
-            match self.correct(face, [goal, doubt], report.norm) {
+            match self.correct(face, goal, report.norm, for_ever) {
                 Correction::None if report.norm <= goal => return ControlFlow::Break(Outcome::Converged),
                 Correction::None => {}
                 Correction::Shift if self.follows < FOLLOWS => {
@@ -256,10 +255,11 @@ impl Run<'_> {
     }
 
     /// Lets rows of negative force go and takes rows of violated gap in, and corrects discs. A tolerance of gaps, part of the `goal` of
-    /// all rows, keeps rows that have neither force nor gap from coming and going; what slides against its friction by less than
-    /// `doubt` does not. Where the set is another one `residual` is without springs afterwards.
-    fn correct(&mut self, face: &mut dyn Face, [goal, doubt]: [f64; 2], norm: f64) -> Correction {
+    /// all rows, keeps rows that have neither force nor gap from coming and going; what slides against its friction does not either, up
+    /// to what is in doubt, which is nothing where slips turn `for_ever`. Where the set is another one `residual` is without springs afterwards.
+    fn correct(&mut self, face: &mut dyn Face, goal: f64, norm: f64, for_ever: bool) -> Correction {
         let tolerance = OF_ONE * goal;
+        let doubt = if for_ever { 0.0 } else { tolerance.max(DOUBT * norm) };
         self.work.copy_from_slice(&self.residual);
         face.gaps(&mut self.work);
         let mut moved = Vec::new();

@@ -101,8 +101,13 @@ pub struct Limits {
 impl Limits {
     /// The gradient norm to reach from `first`.
     pub fn target(&self, first: f64) -> f64 {
-        let absolute = if first <= self.rounding { self.rounding } else { self.absolute };
+        let absolute = if self.told(first).is_some() { self.absolute } else { self.rounding };
         (self.relative * self.reference.unwrap_or(first)).max(absolute).max(self.drop * first)
+    }
+
+    /// A first gradient norm, unless it may be nothing but rounding.
+    pub fn told(&self, first: f64) -> Option<f64> {
+        (first > self.rounding).then_some(first)
     }
 }
 
