@@ -271,9 +271,8 @@ impl Programs {
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
         face.slides.adopt(&kept);
-        let (slides, has_discs, uneven) =
-            (face.slides.clone(), problem.constraints.has_friction, problem.constraints.uneven);
-        let start = active_set::Guess { x, residual, kept, slides, has_discs, uneven, astray: ASTRAY, directions };
+        let (slides, uneven) = (face.slides.clone(), problem.constraints.uneven);
+        let start = active_set::Guess { x, residual, kept, slides, uneven, astray: ASTRAY, directions };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let active_set::Solution { x: balanced, residual, slides, outcome, statistics, first_norm, directions, .. } =
             solution;

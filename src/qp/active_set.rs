@@ -6,7 +6,8 @@
 //!
 //! The equality problems are solved loosely. Each time the residual has dropped by a factor the set is checked, and PCPG
 //! goes on with its directions if the set stands. How loosely depends on how the sets go (`exactness`). Where the tolerance is not the
-//! caller's last, it can do with a set on which few rows are still wrong; the last correction is made, and not solved for.
+//! caller's last, it can do with a set on which few rows are still wrong; the last correction is made, and not solved for. Before that
+//! very few wrong bounds wait: their correction would cost the directions.
 //!
 //! Discs ([`super::slides`]) are corrected along with the bounds. Where none of them changes its set, radii and directions of slips
 //! follow once they are further off than the residual. Then the caller's `A` includes the springs across slips. Where radii grow with
@@ -34,6 +35,8 @@ const FOLLOWS: usize = 100;
 const OF_ONE: f64 = 0.1;
 /// What slides by less than this share of the residual may slide the other way.
 const DOUBT: f64 = 0.2;
+/// Of the rows that may be on the wrong set in the end this share waits there before it is corrected.
+const WAITING: f64 = 0.03;
 /// A move of x smaller than this, relative to x, is rounding.
 const ROUNDING: f64 = 1e-13;
 
@@ -81,8 +84,6 @@ pub struct Guess {
     pub kept: Vec<bool>,
     /// The discs with a guess of what they do, to which the face is restricted already.
     pub slides: Slides,
-    /// Whether any rank has discs.
-    pub has_discs: bool,
     /// Whether rows are of unequal length, as where stiffness jumps.
     pub uneven: bool,
     /// Where the tolerance is that of `drop`: the share of bounds that may be on the wrong set in the end.
@@ -94,19 +95,19 @@ pub struct Guess {
 /// Solves the problem. Give `limits` a reference at a warm start: the default is the first residual, which is too small
 /// there.
 pub fn solve(space: &dyn Space, face: &mut dyn Face, bounded: &[bool], start: Guess, limits: &Limits) -> Solution {
-    let Guess { x, residual, kept, slides, has_discs, uneven, astray, directions } = start;
+    let Guess { x, residual, kept, slides, uneven, astray, directions } = start;
     let n = x.len();
     let mut run = Run {
         space,
         bounded,
         uneven,
         few: 0.0,
+        waiting: 0.0,
         follows: 0,
         x: x.clone(),
         residual,
         kept,
         slides,
-        has_discs,
         work: vec![0.0; n],
         image: vec![0.0; n],
         statistics: Statistics::default(),
@@ -131,14 +132,14 @@ struct Run<'a> {
     uneven: bool,
     /// So many bounds and discs may be on the wrong set where the tolerance is not the last.
     few: f64,
+    /// So many bounds wait for their correction above the tolerance.
+    waiting: f64,
     /// How often directions and radii of discs have been followed.
     follows: usize,
     x: Vec<f64>,
     residual: Vec<f64>,
     kept: Vec<bool>,
     slides: Slides,
-    /// Whether any rank has discs.
-    has_discs: bool,
     work: Vec<f64>,
     image: Vec<f64>,
     statistics: Statistics,
@@ -158,6 +159,7 @@ impl Run<'_> {
                 floor = Limits { drop: 0.0, ..*limits }.target(self.first_norm);
                 limits.target(self.first_norm)
             });
+            self.waiting = if goal > floor { WAITING * self.few } else { 0.0 };
             let relative = exactness.take_relative();
             let of_set = Limits { relative, reference: None, absolute: goal, rounding: 0.0, drop: 0.0, ..*limits };
             let change = match self.solve_on_set(face, solver, &mut wish, exactness.turns_for_ever(), &of_set) {
@@ -254,9 +256,10 @@ impl Run<'_> {
         self.space.norm(&self.work)
     }
 
-    /// Lets rows of negative force go and takes rows of violated gap in, and corrects discs. A tolerance of gaps, part of the `goal` of
-    /// all rows, keeps rows that have neither force nor gap from coming and going; what slides against its friction does not either, up
-    /// to what is in doubt, which is nothing where slips turn `for_ever`. Where the set is another one `residual` is without springs afterwards.
+    /// Lets rows of negative force go and takes rows of violated gap in, and corrects discs. Very few rows, and no disc besides, wait until
+    /// the `goal` of all rows is met. A part of it, a tolerance of gaps, keeps rows that have neither force nor gap from coming and going;
+    /// what slides against its friction does not either, up to what is in doubt, which is nothing where slips turn `for_ever`. Where the set
+    /// is another one `residual` is without springs afterwards.
     fn correct(&mut self, face: &mut dyn Face, goal: f64, norm: f64, for_ever: bool) -> Correction {
         let tolerance = OF_ONE * goal;
         let doubt = if for_ever { 0.0 } else { tolerance.max(DOUBT * norm) };
@@ -273,22 +276,22 @@ impl Run<'_> {
             self.kept[i] ^= changes;
             self.work[i] = f64::from(changes);
         }
-        if !self.has_discs {
-            let rows = self.space.dot(&self.work, &self.work);
-            return if rows > 0.0 { Correction::Set(Change { rows, springs: 0.0, norm }) } else { Correction::None };
-        }
         let next = self.slides.next(&self.x, &moved, [tolerance, doubt]);
-        let [mut fixed, mut hung] = [(); 2].map(|()| vec![0.0; self.x.len()]);
-        self.slides.compare(&next, &self.x, [&mut self.work, &mut fixed, &mut hung]);
-        let d = self.space.dots(&[(&self.work, &self.work), (&fixed, &fixed), (&hung, &hung)]);
-        let (enough, springs) = (norm.max(goal), d[2].sqrt());
-        if d[0] > 0.0 || springs > enough {
+        let [mut turned, mut fixed, mut hung] = [(); 3].map(|()| vec![0.0; self.x.len()]);
+        self.slides.compare(&next, &self.x, [&mut turned, &mut fixed, &mut hung]);
+        let d = self.space.dots(&[&self.work, &turned, &fixed, &hung].map(|v| (&**v, &**v)));
+        let (bounds, discs, fixed, springs, enough) = (d[0], d[1], d[2].sqrt(), d[3].sqrt(), norm.max(goal));
+        if norm > goal && bounds <= self.waiting && discs == 0.0 && springs <= enough {
+            for (kept, &changes) in self.kept.iter_mut().zip(&self.work) {
+                *kept ^= changes != 0.0;
+            }
+        } else if bounds + discs > 0.0 || springs > enough {
             self.slides.add_compliance(1.0, &self.x, &mut self.residual);
             self.slides.take(next);
             self.slides.mark(&mut self.kept);
-            return Correction::Set(Change { rows: d[0], springs, norm });
+            return Correction::Set(Change { rows: bounds + discs, springs, norm });
         }
-        if d[1].sqrt() > enough {
+        if fixed > enough {
             self.slides.shift(&next);
             return Correction::Shift;
         }

@@ -25,7 +25,6 @@ fn from_with(torn: &mut Torn, (x, mut kept): (Vec<f64>, Vec<bool>), astray: f64,
             residual,
             kept,
             slides: Slides::default(),
-            has_discs: false,
             uneven: false,
             astray,
             directions: Directions::default(),
@@ -90,6 +89,22 @@ fn few_rows_may_be_astray_unless_the_tolerance_is_the_last() {
     assert!(wrong > 0 && 2 * wrong <= bounds, "{wrong} of {bounds}");
     let off = distance(&strict.x, &astray.x) / dot(&strict.x, &strict.x).sqrt();
     assert!(off < 0.2, "{off}");
+}
+
+#[test]
+fn a_wrong_row_of_many_waits_for_the_tolerance() {
+    let mut torn = Torn::membrane(6, 18);
+    let n = torn.d.len();
+    let exact = from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS);
+    let mut kept = exact.kept.clone();
+    let wrong = (0..n).find(|&i| torn.bounded[i] && !kept[i]).unwrap();
+    kept[wrong] = true;
+    let loose = Limits { drop: 1e-3, ..LIMITS };
+    let [none, few] = [1e-3, 0.5].map(|share| from_with(&mut torn, (vec![0.0; n], kept.clone()), share, &loose));
+    assert_eq!((none.outcome, few.outcome), (Outcome::Converged, Outcome::Converged));
+    assert!(few.statistics.hessian < none.statistics.hessian, "{:?} {:?}", few.statistics, none.statistics);
+    // It is corrected in the end.
+    assert_eq!((few.statistics.sets, few.kept[wrong]), (1, false));
 }
 
 #[test]

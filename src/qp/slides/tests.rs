@@ -98,7 +98,6 @@ fn solved(a: Matrix, d: &[f64], discs: Vec<Disc>) -> active_set::Solution {
         residual: d.to_vec(),
         kept,
         slides,
-        has_discs: true,
         astray: 0.0,
         uneven: false,
         directions: Directions::default(),
