@@ -75,8 +75,8 @@ impl Matrix {
             clusters: subdomains.iter().map(|s| clusters.of(s.id)).collect(),
             acting: Default::default(),
         };
-        let of_node = |own: usize, node: usize| modes[own].at(subdomains[own].points[node]);
-        gather.moved(of_node, |row, values| {
+        let of_dof = |own: usize, node: usize, axis| modes[own].along(axis, subdomains[own].points[node]);
+        gather.moved(of_dof, |row, values| {
             let slots = constraints.slots(row).map(|slot| constraints.slot_subdomain[slot]);
             result.push(row, &constraints.rows[row], clusters, slots.zip(values));
         });

@@ -284,8 +284,8 @@ impl<'a> Coarse<'a> {
     }
 
     /// Of six numbers a cluster, those for a subdomain.
-    pub fn of_subdomain<'b>(&self, subdomain: usize, amplitudes: &'b [f64]) -> &'b [f64] {
-        &amplitudes[MODES * self.clusters.of(subdomain)..][..MODES]
+    pub fn of_subdomain(&self, subdomain: usize, amplitudes: &[f64]) -> [f64; MODES] {
+        amplitudes.as_chunks().0[self.clusters.of(subdomain)]
     }
 
     /// `rows += factor G'a`. Local.

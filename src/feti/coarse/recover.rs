@@ -27,7 +27,7 @@ pub fn add_rigid_motion(
     torn: &mut Torn,
 ) {
     for ((subdomain, modes), local) in subdomains.iter().zip(modes).zip(torn) {
-        let amplitudes: Vec<f64> = coarse.of_subdomain(subdomain.id, amplitudes).iter().map(|a| factor * a).collect();
-        modes.add_motion(&subdomain.points, &amplitudes, local);
+        let amplitudes = coarse.of_subdomain(subdomain.id, amplitudes).map(|a| factor * a);
+        modes.add_motion(&subdomain.points, amplitudes, local);
     }
 }

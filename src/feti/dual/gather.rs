@@ -127,14 +127,14 @@ impl<'a> Gather<'a> {
         self.exchange(1, fill, |row, slots| rows[row] = slots.iter().fold(0.0, |sum, slot| sum + slot));
     }
 
-    /// Hands to `take` what the six modes of each slot's subdomain make of each row, given the modes' displacements of a node of an own
-    /// subdomain, `[component][mode]`. One neighbour exchange.
-    pub fn moved(&self, modes: impl Fn(usize, usize) -> [[f64; 6]; 3], mut take: impl FnMut(usize, &[[f64; 6]])) {
+    /// Hands to `take` what the six modes of each slot's subdomain make of each row, given one component of the modes' displacements of
+    /// an own subdomain's node. One neighbour exchange.
+    pub fn moved(&self, modes: impl Fn(usize, usize, usize) -> [f64; 6], mut take: impl FnMut(usize, &[[f64; 6]])) {
         let fill = |own: usize, slots: &mut [f64]| {
             let slots = slots.as_chunks_mut::<6>().0;
             for entry in &self.entries[own] {
-                let of_node = &modes(own, entry.dof as usize / 3)[entry.dof as usize % 3];
-                slots[entry.slot as usize].iter_mut().zip(of_node).for_each(|(sum, x)| *sum += entry.value * x);
+                let of_dof = modes(own, entry.dof as usize / 3, entry.dof as usize % 3);
+                slots[entry.slot as usize].iter_mut().zip(of_dof).for_each(|(sum, x)| *sum += entry.value * x);
             }
         };
         self.exchange(6, fill, |row, slots| take(row, slots.as_chunks().0));

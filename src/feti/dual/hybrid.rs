@@ -91,8 +91,7 @@ impl<'a> Hybrid<'a> {
         let motions = self.balance.motions(&mut self.jumps);
         let of_members = motions.as_chunks().0.iter().zip(self.subdomains).zip(self.modes).zip(u);
         for (((amplitudes, subdomain), modes), u) in of_members {
-            let back: [f64; 6] = amplitudes.map(|a: f64| -a);
-            modes.add_motion(&subdomain.shape, &back, u);
+            modes.add_motion(&subdomain.shape, amplitudes.map(|a: f64| -a), u);
         }
     }
 

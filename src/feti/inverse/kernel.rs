@@ -10,8 +10,8 @@ use crate::work;
 /// Rigid modes of a subdomain, or of a cluster.
 pub const MODES: usize = 6;
 
-/// Operations at a point: 30 for the modes there, and 2 for each of their 18 numbers.
-const OF_POINT: usize = 66;
+/// Operations at a point: 3 for the arm, 9 for a cross product, and 6 additions.
+const OF_POINT: usize = 18;
 
 /// Orthonormal rigid modes: columns 0..3 translations, 3..6 rotations.
 #[derive(Clone, Debug)]
@@ -95,25 +95,35 @@ impl RigidModes {
         modes
     }
 
-    /// `R'v` over the given nodes; `v` has three entries a node.
-    pub fn resultants(&self, points: &[[f64; 3]], v: &[f64]) -> [f64; 6] {
-        work::each(points.len(), OF_POINT, 2 * size_of::<[f64; 3]>());
-        let mut sum = [0.0; 6];
-        for (point, force) in points.iter().zip(v.chunks_exact(3)) {
-            for (row, f) in self.at(*point).iter().zip(force) {
-                sum.iter_mut().zip(row).for_each(|(s, r)| *s += r * f);
-            }
+    /// One component of the modes' displacements at a point.
+    pub fn along(&self, axis: usize, point: [f64; 3]) -> [f64; MODES] {
+        let (arm, [first, second]) = (difference(point, self.centre), [(axis + 1) % 3, (axis + 2) % 3]);
+        let mut modes = [0.0; MODES];
+        modes[axis] = self.translation;
+        for (mode, turn) in modes[3..].iter_mut().zip(&self.axes) {
+            *mode = turn[first] * arm[second] - turn[second] * arm[first];
         }
-        sum
+        modes
+    }
+
+    /// `R'v` over the given nodes; `v` has three entries a node.
+    pub fn resultants(&self, points: &[[f64; 3]], v: &[f64]) -> [f64; MODES] {
+        work::each(points.len(), OF_POINT, 2 * size_of::<[f64; 3]>());
+        let mut sum = [0.0; MODES];
+        for (point, force) in points.iter().zip(v.as_chunks().0) {
+            let moment = cross(difference(*point, self.centre), *force);
+            sum.iter_mut().zip(force.iter().chain(&moment)).for_each(|(s, x)| *s += x);
+        }
+        self.of_force(sum)
     }
 
     /// `v += R amplitudes` over the given nodes.
-    pub fn add_motion(&self, points: &[[f64; 3]], amplitudes: &[f64], v: &mut [f64]) {
+    pub fn add_motion(&self, points: &[[f64; 3]], amplitudes: [f64; MODES], v: &mut [f64]) {
         work::each(points.len(), OF_POINT, 2 * size_of::<[f64; 3]>());
-        for (point, u) in points.iter().zip(v.chunks_exact_mut(3)) {
-            for (row, u) in self.at(*point).iter().zip(u) {
-                *u += row.iter().zip(amplitudes).map(|(r, a)| r * a).sum::<f64>();
-            }
+        let [x, y, z, rotation @ ..] = self.to_motion(amplitudes);
+        for (point, u) in points.iter().zip(v.as_chunks_mut::<3>().0) {
+            let turned = cross(rotation, difference(*point, self.centre));
+            u.iter_mut().zip([x, y, z]).zip(turned).for_each(|((u, t), r)| *u += t + r);
         }
     }
 }
@@ -176,7 +186,12 @@ mod tests {
             let mut unit = [0.0; 6];
             unit[k] = 1.0;
             let mut v = vec![0.0; 15];
-            modes.add_motion(&points, &unit, &mut v);
+            modes.add_motion(&points, unit, &mut v);
+            for (component, moved) in v.iter().enumerate() {
+                let (point, axis) = (points[component / 3], component % 3);
+                assert_eq!(modes.at(point)[axis], modes.along(axis, point));
+                assert!((moved - modes.along(axis, point)[k]).abs() < 1e-14);
+            }
             let products = modes.resultants(&points, &v);
             for (l, product) in products.iter().enumerate() {
                 assert!((product - unit[l]).abs() < 1e-14, "{k} {l} {product}");

@@ -58,7 +58,7 @@ impl Pins {
         let modes = RigidModes::new(points);
         let mut gram = Mat::<f64>::zeros(MODES, MODES);
         for &dof in &unknowns {
-            let motion = modes.at(points[dof as usize / 3])[dof as usize % 3];
+            let motion = modes.along(dof as usize % 3, points[dof as usize / 3]);
             for i in 0..MODES {
                 (0..MODES).for_each(|j| gram[(i, j)] += motion[i] * motion[j]);
             }

@@ -45,7 +45,7 @@ impl<'a> Gluing<'a> {
         let modes = &motions.shapes[..];
         let plain: Vec<RigidModes> = modes.iter().map(RigidModes::plain).collect();
         gather.moved(
-            |own, node| plain[own].at(subdomains[own].shape[node]),
+            |own, node, axis| plain[own].along(axis, subdomains[own].shape[node]),
             |row, values| {
                 let Some(level) = of_rows[row] else { return };
                 let axis = constraints.rows[row].terms[0].axis;

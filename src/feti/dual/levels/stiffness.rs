@@ -4,6 +4,7 @@
 //! for forces that are in balance over the group.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 use std::rc::Rc;
 
 use faer::linalg::solvers::DenseSolveCore;
@@ -18,8 +19,8 @@ use crate::feti::inverse::kernel::MODES;
 use crate::simd::vectorised;
 use crate::work;
 
-/// `G` of a row, by members.
-type OfRow = Vec<(u32, [f64; MODES])>;
+/// `G` of a row for one member.
+type OfMember = (u32, [f64; MODES]);
 type Block = [f64; MODES * MODES];
 /// Blocks between two members.
 type Blocks = BTreeMap<(u32, u32), Block>;
@@ -52,8 +53,9 @@ pub struct OfLevel {
 
 /// What own subdomains have of the rows of a level.
 struct Parts {
-    /// The rows between the members of each one's group, by a number that orders them.
-    rows: Vec<Vec<(u32, OfRow)>>,
+    /// The rows between the members of each one's group: a number that orders them, and which of `members` they have.
+    rows: Vec<Vec<(u32, Range<u32>)>>,
+    members: Vec<OfMember>,
     /// Diagonal blocks.
     diagonals: Vec<Block>,
 }
@@ -62,10 +64,10 @@ impl Equalities<'_> {
     /// Of the groups of a level. Collective.
     pub fn of_level(&self, level: usize) -> OfLevel {
         let Self { connection, .. } = self;
-        let Parts { rows, diagonals } = self.parts(level);
+        let parts = self.parts(level);
         let mut known: HashMap<Vec<u64>, Option<Rc<Inverse>>> = HashMap::new();
-        let blocks = self.brought_home(level, rows);
-        let of_group = |(members, blocks): (&std::ops::Range<usize>, &Blocks)| {
+        let blocks = self.brought_home(level, &parts);
+        let of_group = |(members, blocks): (&Range<usize>, &Blocks)| {
             let entry = |(&(row, column), block): (&(u32, u32), &Block)| {
                 let place = u64::from(row) << 32 | u64::from(column);
                 [place].into_iter().chain(block.map(f64::to_bits)).collect::<Vec<_>>()
@@ -74,7 +76,7 @@ impl Equalities<'_> {
             known.entry(key).or_insert_with(|| Inverse::new(members.len(), blocks).map(Rc::new)).clone()
         };
         let inverses = connection.tree.members(level).iter().zip(&blocks).map(of_group).collect();
-        let sums = connection.tree.sum(level - 1, diagonals.as_flattened(), MODES * MODES);
+        let sums = connection.tree.sum(level - 1, parts.diagonals.as_flattened(), MODES * MODES);
         let lines = |block: &Block| std::array::from_fn(|i| std::array::from_fn(|j| block[MODES * i + j]));
         OfLevel { inverses, diagonals: sums.as_chunks().0.iter().map(lines).collect() }
     }
@@ -85,7 +87,7 @@ impl Equalities<'_> {
         let Interconnection { gather, motions, .. } = connection;
         let first = subdomains.first().map_or(0, |s| s.id);
         let own = |subdomain: u32| (subdomain as usize).checked_sub(first).filter(|&own| own < subdomains.len());
-        let mut rows: Vec<Vec<(u32, OfRow)>> = vec![Vec::new(); subdomains.len()];
+        let (mut rows, mut all) = (vec![Vec::new(); subdomains.len()], Vec::new());
         let mut diagonals = vec![[0.0; MODES * MODES]; subdomains.len()];
         // The order of rows depends on what is outside of the group, that of nodes does not.
         let mut dofs = vec![0; constraints.rows.len()];
@@ -97,38 +99,54 @@ impl Equalities<'_> {
         gather.moved(modes_of_nodes(level - 1, motions, subdomains), |row, values| {
             let Some(of_row) = of_rows[row].filter(|of_row| *of_row >= level) else { return };
             let slots = &constraints.slot_subdomain[constraints.slots(row)];
-            let members = of_groups(clusters, level - 1, slots, values);
-            let member = |subdomain: u32| clusters.group(level - 1, subdomain as usize);
-            for (of_member, (_, six)) in slots.chunk_by(|&a, &b| member(a) == member(b)).zip(&members) {
-                if let Some(own) = own(of_member[0]) {
-                    add_product(&mut diagonals[own], six, six);
+            let (begin, mut slot) = (all.len(), 0);
+            while slot < slots.len() {
+                let (first, member) = (slot, clusters.group(level - 1, slots[slot] as usize));
+                let mut six = values[slot];
+                slot += 1;
+                while slot < slots.len() && clusters.group(level - 1, slots[slot] as usize) == member {
+                    six.iter_mut().zip(values[slot]).for_each(|(sum, x)| *sum += x);
+                    slot += 1;
                 }
+                if let Some(own) = own(slots[first]) {
+                    add_product(&mut diagonals[own], &six, &six);
+                }
+                all.push((member as u32, six));
             }
-            if let Some(own) = own(slots[0]).filter(|_| of_row == level) {
-                rows[own].push((dofs[row], members));
+            match own(slots[0]).filter(|_| of_row == level) {
+                Some(own) => rows[own].push((dofs[row], begin as u32..all.len() as u32)),
+                None => all.truncate(begin),
             }
         });
-        Parts { rows, diagonals }
+        Parts { rows, members: all, diagonals }
     }
 
     /// Lower blocks of the groups at home here. Collective.
-    fn brought_home(&self, level: usize, rows: Vec<Vec<(u32, OfRow)>>) -> Vec<Blocks> {
+    fn brought_home(&self, level: usize, parts: &Parts) -> Vec<Blocks> {
         let Self { clusters, connection: Interconnection { tree, .. }, subdomains, .. } = self;
         let mut outgoing = vec![Vec::new(); tree.comm().size()];
-        for (subdomain, mut rows) in subdomains.iter().zip(rows) {
+        for (subdomain, rows) in subdomains.iter().zip(&parts.rows) {
+            let mut rows = rows.clone();
             rows.sort_by_key(|row| row.0);
-            let mut blocks = Blocks::new();
-            for (_, of_row) in &rows {
-                work::add(MODES * MODES * of_row.len() * (of_row.len() + 1), size_of_val(&of_row[..]));
+            // A subdomain has few pairs of neighbours.
+            let (mut places, mut blocks) = (Vec::new(), Vec::new());
+            for (_, members) in rows {
+                let of_row = &parts.members[members.start as usize..members.end as usize];
+                work::add(MODES * MODES * of_row.len() * (of_row.len() + 1), size_of_val(of_row));
                 for (at, (column, b)) in of_row.iter().enumerate() {
                     for (row, a) in &of_row[at..] {
-                        add_product(blocks.entry((*row, *column)).or_insert([0.0; MODES * MODES]), a, b);
+                        let place = places.iter().position(|place| *place == (*row, *column)).unwrap_or_else(|| {
+                            places.push((*row, *column));
+                            blocks.push([0.0; MODES * MODES]);
+                            blocks.len() - 1
+                        });
+                        add_product(&mut blocks[place], a, b);
                     }
                 }
             }
             let group = clusters.group(level, subdomain.id);
             let to = &mut outgoing[tree.home(clusters.begin(level, group))];
-            for ((row, column), block) in blocks {
+            for ((row, column), block) in places.into_iter().zip(blocks) {
                 to.extend([u64::from(row), u64::from(column)]);
                 to.extend(block.map(f64::to_bits));
             }
@@ -155,30 +173,17 @@ fn add_product(block: &mut Block, a: &[f64; MODES], b: &[f64; MODES]) {
     }
 }
 
-/// The modes of the groups of a level at the nodes of own subdomains, `[component][mode]`. Congruent groups have equal bits on
-/// the lowest level, where all depends on shapes alone.
+/// The modes of the groups of a level at the nodes of own subdomains, one component. Congruent groups have equal bits on the
+/// lowest level, where all depends on shapes alone.
 fn modes_of_nodes<'s>(
     level: usize,
     motions: &'s Motions,
     subdomains: &'s [Subdomain],
-) -> impl Fn(usize, usize) -> [[f64; MODES]; 3] + 's {
-    move |own, node| match level {
-        0 => motions.shapes[own].at(subdomains[own].shape[node]),
-        _ => motions.levels[level][own].at(subdomains[own].points[node]),
+) -> impl Fn(usize, usize, usize) -> [f64; MODES] + 's {
+    move |own, node, axis| match level {
+        0 => motions.shapes[own].along(axis, subdomains[own].shape[node]),
+        _ => motions.levels[level][own].along(axis, subdomains[own].points[node]),
     }
-}
-
-/// Sums of the slots of each group of a level. Subdomains ascend.
-fn of_groups(clusters: &Clusters, level: usize, slots: &[u32], values: &[[f64; MODES]]) -> OfRow {
-    let mut of_row = OfRow::new();
-    for (&subdomain, six) in slots.iter().zip(values) {
-        let group = clusters.group(level, subdomain as usize) as u32;
-        match of_row.last_mut() {
-            Some((last, sum)) if *last == group => sum.iter_mut().zip(six).for_each(|(sum, x)| *sum += x),
-            _ => of_row.push((group, *six)),
-        }
-    }
-    of_row
 }
 
 impl Inverse {

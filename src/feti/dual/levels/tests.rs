@@ -60,7 +60,7 @@ fn modes_of_groups_are_orthonormal_and_sums_of_their_childrens() {
                         let mut unit = [0.0; MODES];
                         unit[k] = 1.0;
                         let mut v = vec![0.0; 3 * points.len()];
-                        modes.add_motion(&points, &unit, &mut v);
+                        modes.add_motion(&points, unit, &mut v);
                         let products = modes.resultants(&points, &v);
                         assert!((0..MODES).all(|l| (products[l] - unit[l]).abs() < 1e-13), "{products:?}");
                         for child in clusters.children(level, group) {
@@ -96,7 +96,7 @@ fn forces_between_members_take_their_resultants_if_these_balance_clusters() {
                     let of = modes.resultants(&setup.subdomains()[own].points, &torn[own]);
                     sum.iter_mut().zip(of).for_each(|(s, x)| *s -= x);
                 }
-                members.for_each(|own| modes.add_motion(&setup.subdomains()[own].points, &sum, &mut torn[own]));
+                members.for_each(|own| modes.add_motion(&setup.subdomains()[own].points, sum, &mut torn[own]));
             }
             let shapes = setup.motions.levels[0].iter().zip(setup.subdomains());
             let resultants = |torn: &[Vec<f64>]| -> Vec<f64> {

@@ -233,7 +233,7 @@ fn pins_know_which_rigid_motions_they_leave_free() {
                 let modes = RigidModes::new(&setup.subdomains()[own].shape);
                 for motion in &pins.free {
                     for &dof in &pins.unknowns {
-                        let at = modes.at(setup.subdomains()[own].shape[dof as usize / 3])[dof as usize % 3];
+                        let at = modes.along(dof as usize % 3, setup.subdomains()[own].shape[dof as usize / 3]);
                         assert!(at.iter().zip(motion).map(|(m, a)| m * a).sum::<f64>().abs() < 1e-14);
                     }
                 }
