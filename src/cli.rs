@@ -32,7 +32,7 @@ use crate::heap::EXIT_MEMORY;
 use crate::model::ModelError;
 use crate::model::meshes::MeshError;
 use crate::monitor::stdout;
-use crate::monitor::timing::peak_rss_mb;
+use crate::monitor::timing::{peak_private_mb, peak_rss_mb};
 use crate::record::summary::Summary;
 use crate::restart::state::NoStart;
 use crate::results::OutputError;
@@ -247,7 +247,9 @@ fn describe_run(summary: &mut Summary, source: &Source, comm: &dyn Comm) {
     summary.scene = source.scene.clone();
     summary.level = source.level;
     summary.ranks = comm.size();
-    let mine = peak_rss_mb().unwrap_or(f64::NAN);
-    summary.peak_rss_mb = Some(exact::sum(comm, &[mine], 1)[0]);
+    let [mine, private] = [peak_rss_mb(), peak_private_mb()].map(|peak| peak.unwrap_or(f64::NAN));
+    let sums = exact::sum(comm, &[mine, private], 2);
+    summary.peak_rss_mb = Some(sums[0]);
+    summary.peak_private_mb = Some(sums[1]);
     summary.peak_rss_mb_max = Some(maximum(comm, &[mine])[0]);
 }

@@ -36,6 +36,8 @@ Seconds are shown where each rank has a core.
 - *all ranks together*: sum over the ranks, over that on the fewest ranks (per rank in weak scaling). More than 1 is work that
   ranks repeat.
 - *busiest / mean*: of the ranks.
+- *MiB of their own*: largest memory of all ranks without pages that processes of a host share (libraries, messages between
+  them); *MiB resident* counts these for each.
 - *messages of an F*: to single ranks, in one application of F, on the busiest rank.
 """
 
@@ -105,6 +107,12 @@ class Curve(scaling.Curve):
 
         return amount(ranks) / amount(self.ranks[0])
 
+    def private(self, ranks):
+        """Memory of their own, as work in `together`."""
+        first = self.ranks[0]
+        scale = first / ranks if self.weak else 1
+        return self.groups[ranks].first["peak_private_mb"] / self.groups[first].first["peak_private_mb"] * scale
+
     def work_rows(self):
         for ranks in self.ranks:
             group = self.groups[ranks]
@@ -115,6 +123,7 @@ class Curve(scaling.Curve):
                 group.count("newton_iterations"), group.count("hessian_multiplications"),
                 f"{self.together(ranks, 'flops'):.2f}", f"{self.together(ranks, 'bytes'):.2f}",
                 f"{ratio(of['flops']):.2f}", f"{ratio(of['bytes']):.2f}",
+                thousands(round(group.first["peak_private_mb"])), f"{self.private(ranks):.2f}",
                 thousands(round(group.first["peak_rss_mb"])), thousands(round(group.first["peak_rss_mb_max"])),
                 group.seconds(lambda s: s["time_total"]) if timed else "",
             ]
@@ -212,7 +221,7 @@ def plots(folder, curves):
         for word, value in (("F, mean", size), ("longest of all", lambda g: total(g)["largest_message"]["busiest"]))
     ])
     add("memory", "Memory of all ranks together", "MiB", [
-        (curve.short(), over(curve, lambda g: g.first["peak_rss_mb"])) for curve in curves
+        (curve.short(), over(curve, lambda g: g.first["peak_private_mb"])) for curve in curves
     ])
     return found
 
@@ -227,7 +236,8 @@ def pages(folder=RESULTS, raw=RAW):
     if not curves:
         return {}
     head = ["", "ranks", "subdomains", "Newton steps", "multiplications by F", "flops, all ranks together", "bytes, all together"]
-    head += ["flops, busiest / mean", "bytes, busiest / mean", "MiB in all", "MiB, largest rank", "seconds"]
+    head += ["flops, busiest / mean", "bytes, busiest / mean", "MiB of their own", "all together",
+             "MiB resident", "MiB, largest rank", "seconds"]
     text = [HEAD, "## Work and memory\n", table(head, [row for curve in curves for row in curve.work_rows()])]
     head = ["", "ranks", "partners, most", "mean", "messages of an F", "messages, busiest / mean", "KiB a message of F"]
     head += ["sent, busiest / mean", "MiB sent, busiest", "MiB received, busiest", "longest, MiB"]

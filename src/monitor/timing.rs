@@ -253,10 +253,23 @@ impl Timer {
 
 /// The largest resident memory of this process so far, in MiB; `None` where Linux's `/proc` is missing.
 pub fn peak_rss_mb() -> Option<f64> {
+    of_status(["VmHWM:"]).map(|[peak]| peak)
+}
+
+/// The same without pages that processes of a host share: those of libraries and files, and of MPI for messages between them.
+pub fn peak_private_mb() -> Option<f64> {
+    of_status(["VmHWM:", "RssFile:", "RssShmem:"]).map(|[peak, files, shared]| peak - files - shared)
+}
+
+/// Lines of the process's status, in MiB.
+fn of_status<const N: usize>(names: [&str; N]) -> Option<[f64; N]> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes / 1024.0)
+    let mut values = [0.0; N];
+    for (value, name) in values.iter_mut().zip(names) {
+        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+        *value = line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok()? / 1024.0;
+    }
+    Some(values)
 }
 
 #[cfg(test)]

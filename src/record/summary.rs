@@ -60,7 +60,9 @@ pub struct Summary {
     pub communication: BTreeMap<String, CommunicationRow>,
     /// Sum over the ranks of their largest resident memory, in MiB.
     pub peak_rss_mb: Option<f64>,
-    /// That of the rank with the largest, in MiB.
+    /// The same without pages that processes of a host share.
+    pub peak_private_mb: Option<f64>,
+    /// Resident memory of the rank with the largest, in MiB.
     pub peak_rss_mb_max: Option<f64>,
     /// Largest resident memory of a rank until meshes that are no bricks were read or made, and cut, in MiB.
     pub mesh_reading_mb: Option<f64>,

@@ -29,7 +29,7 @@ def record(scene, width, ranks):
     total = {key: load(*(local[key][k] + coarse[key][k] for k in ("busiest", "mean"))) for key in local}
     summary = {
         "ranks": ranks, "subdomains": 24 * width, "newton_iterations": 3, "hessian_multiplications": 10, "time_total": 1.0,
-        "peak_rss_mb": 100.0 * ranks, "peak_rss_mb_max": 100.0, "time": {}, "counts_total": total,
+        "peak_rss_mb": 100.0 * ranks, "peak_private_mb": 60.0 * ranks, "peak_rss_mb_max": 100.0, "time": {}, "counts_total": total,
         "counts": {"dual operator": local, "coarse problem": coarse},
         "partners": load(4, 2) if ranks > 1 else load(0, 0),
     }
