@@ -457,7 +457,7 @@ def table_1(groups, study):
 
 
 DEPENDS_ON_RANKS = {"ranks", "time", "work", "communication", "time_total", "peak_rss_mb", "memory_estimate_mb"}
-DEPENDS_ON_RANKS |= {"counts", "counts_total", "partners", "newton", "cascade", "imbalance", "peak_rss_mb_max"}
+DEPENDS_ON_RANKS |= {"counts", "counts_total", "partners", "newton", "cascade", "imbalance", "peak_private_mb", "peak_rss_mb_max"}
 
 
 def equality(variant, level, summaries):

@@ -213,6 +213,8 @@ fn programs_can_follow_a_run_and_what_its_ranks_do() {
     assert_eq!(of("sizes")[0]["data"]["sizes"]["subdomains"], summary["subdomains"]);
     assert_eq!(events.last().unwrap()["data"]["converged"], true);
     assert_eq!(of("phases")[0]["data"]["memory_mb"]["max"], summary["peak_rss_mb_max"]);
+    let [private, resident] = ["peak_private_mb", "peak_rss_mb"].map(|key| summary[key].as_f64().unwrap());
+    assert!(0.0 < private && private < resident, "{private} {resident}");
     assert!(summary["imbalance"].as_f64().is_some_and(|ratio| ratio >= 1.0), "{}", summary["imbalance"]);
     for rank in [0, 1] {
         let text = std::fs::read_to_string(trace.join(format!("rank-{rank}.json"))).unwrap();

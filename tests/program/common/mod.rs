@@ -77,7 +77,7 @@ pub const COARSEST: [&str; 3] =
 
 /// A summary without what belongs to the run, and may depend on the ranks or on the clock.
 pub fn only_result(summary: Value) -> Map<String, Value> {
-    const OF_THE_RUN: [&str; 13] = [
+    const OF_THE_RUN: [&str; 14] = [
         "ranks",
         "time",
         "work",
@@ -88,6 +88,7 @@ pub fn only_result(summary: Value) -> Map<String, Value> {
         "time_total",
         "imbalance",
         "peak_rss_mb",
+        "peak_private_mb",
         "peak_rss_mb_max",
         "mesh_reading_mb",
         "provenance",
