@@ -100,18 +100,16 @@ class Curve(scaling.Curve):
         return "weak" if self.weak else "strong"
 
     def together(self, ranks, key):
-        """The sum over all ranks over that on the fewest; of the work for one rank where work grows with the ranks."""
+        """What all ranks count, as in `over_fewest`."""
+        return self.over_fewest(ranks, lambda group, ranks: total(group)[key]["mean"] * ranks)
 
-        def amount(ranks):
-            return total(self.groups[ranks])[key]["mean"] * (1 if self.weak else ranks)
+    def over_fewest(self, ranks, amount):
+        """An amount of all ranks over that of the fewest; of the work for one rank where work grows with the ranks."""
 
-        return amount(ranks) / amount(self.ranks[0])
+        def share(ranks):
+            return amount(self.groups[ranks], ranks) / (ranks if self.weak else 1)
 
-    def private(self, ranks):
-        """Memory of their own, as work in `together`."""
-        first = self.ranks[0]
-        scale = first / ranks if self.weak else 1
-        return self.groups[ranks].first["peak_private_mb"] / self.groups[first].first["peak_private_mb"] * scale
+        return share(ranks) / share(self.ranks[0])
 
     def work_rows(self):
         for ranks in self.ranks:
@@ -123,7 +121,8 @@ class Curve(scaling.Curve):
                 group.count("newton_iterations"), group.count("hessian_multiplications"),
                 f"{self.together(ranks, 'flops'):.2f}", f"{self.together(ranks, 'bytes'):.2f}",
                 f"{ratio(of['flops']):.2f}", f"{ratio(of['bytes']):.2f}",
-                thousands(round(group.first["peak_private_mb"])), f"{self.private(ranks):.2f}",
+                thousands(round(group.first["peak_private_mb"])),
+                f"{self.over_fewest(ranks, lambda group, _: group.first['peak_private_mb']):.2f}",
                 thousands(round(group.first["peak_rss_mb"])), thousands(round(group.first["peak_rss_mb_max"])),
                 group.seconds(lambda s: s["time_total"]) if timed else "",
             ]

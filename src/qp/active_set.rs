@@ -272,20 +272,16 @@ impl Run<'_> {
         }
         for i in 0..self.x.len() {
             let wanted = if self.kept[i] { self.x[i] >= 0.0 } else { self.work[i] > tolerance };
-            let changes = self.bounded[i] && wanted != self.kept[i];
-            self.kept[i] ^= changes;
-            self.work[i] = f64::from(changes);
+            self.work[i] = f64::from(self.bounded[i] && wanted != self.kept[i]);
         }
         let next = self.slides.next(&self.x, &moved, [tolerance, doubt]);
         let [mut turned, mut fixed, mut hung] = [(); 3].map(|()| vec![0.0; self.x.len()]);
         self.slides.compare(&next, &self.x, [&mut turned, &mut fixed, &mut hung]);
         let d = self.space.dots(&[&self.work, &turned, &fixed, &hung].map(|v| (&**v, &**v)));
         let (bounds, discs, fixed, springs, enough) = (d[0], d[1], d[2].sqrt(), d[3].sqrt(), norm.max(goal));
-        if norm > goal && bounds <= self.waiting && discs == 0.0 && springs <= enough {
-            for (kept, &changes) in self.kept.iter_mut().zip(&self.work) {
-                *kept ^= changes != 0.0;
-            }
-        } else if bounds + discs > 0.0 || springs > enough {
+        let may_wait = norm > goal && bounds <= self.waiting && discs == 0.0;
+        if springs > enough || bounds + discs > 0.0 && !may_wait {
+            self.kept.iter_mut().zip(&self.work).for_each(|(kept, changes)| *kept ^= *changes != 0.0);
             self.slides.add_compliance(1.0, &self.x, &mut self.residual);
             self.slides.take(next);
             self.slides.mark(&mut self.kept);

@@ -5,10 +5,11 @@
 //! for all right-hand sides orthogonal to `N`, since `N'C C'a = 0` leaves `C'a = 0`.
 
 use super::bodies::BodyMotions;
-use super::factor::{Blocks, CoarseFactor};
+use super::factor::CoarseFactor;
 use super::sliding::Sliding;
 use super::{Coarse, Floating};
 use crate::comm::Comm;
+use crate::feti::dual::blocks::Blocks;
 use crate::feti::inverse::kernel::MODES;
 
 /// The factor of `G_B G_B' + C C'`.

@@ -7,8 +7,8 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use super::factor::Blocks;
 use crate::decomposition::Subdomain;
+use crate::feti::dual::blocks::Blocks;
 use crate::feti::dual::levels::Tree;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
 use crate::span::complement;

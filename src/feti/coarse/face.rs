@@ -24,8 +24,8 @@ use faer::{ColRef, Mat};
 
 use super::Coarse;
 use super::base::Base;
-use super::factor::{Block, Blocks};
 use super::sliding::Sliding;
+use crate::feti::dual::blocks::{Block, Blocks};
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
 use crate::span::complement;

@@ -4,19 +4,14 @@
 //! pattern of all rows, which is ordered and analysed once.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use crate::comm::Comm;
+use crate::feti::dual::blocks::Blocks;
 use crate::feti::inverse::kernel::MODES;
 use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use crate::sparse::fronts::Fronts;
 use crate::sparse::ordering::nested_dissection;
-
-/// A 6x6 block of `G G'`, row by row.
-pub type Block = [f64; MODES * MODES];
-/// The blocks of `G G'`, by `(row, column)` cluster, lower triangle.
-pub type Blocks = BTreeMap<(usize, usize), Block>;
 
 /// The clusters that each one has a block with, as METIS wants it: begins and neighbours.
 fn adjacency(blocks: &Blocks, clusters: usize) -> (Vec<i32>, Vec<i32>) {

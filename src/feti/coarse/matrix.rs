@@ -5,10 +5,10 @@
 
 use std::ops::Range;
 
-use super::factor::Block;
 use super::sliding::Weight;
 use crate::constraint::{Constraints, Kind, Row};
 use crate::decomposition::{Clusters, Subdomain};
+use crate::feti::dual::blocks::{Block, FewBlocks, Place, add_product};
 use crate::feti::dual::gather::Gather;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
 use crate::work;
@@ -173,32 +173,24 @@ impl Matrix {
 
     /// Blocks of `G W G'` of some rows with these weights `W`: for each own subdomain its cluster, and what it adds to the lower blocks
     /// of that line, by column. Complete: every row that a subdomain takes part in is on its rank.
-    pub fn products(&self, rows: Rows, weight: impl Fn(usize) -> Weight) -> Vec<(usize, Vec<(usize, Block)>)> {
+    pub fn products(&self, rows: Rows, weight: impl Fn(usize) -> Weight) -> Vec<(Place, Block)> {
         let mut result = Vec::new();
         for (&cluster, acting) in self.clusters.iter().zip(&self.acting[rows as usize]) {
-            // A cluster has few neighbours.
-            let (mut columns, mut blocks): (Vec<u32>, Vec<Block>) = Default::default();
+            let mut blocks = FewBlocks::default();
             for Acting { row, modes } in acting {
                 let Weight { own, other } = weight(*row as usize);
                 let both = [(*row as usize, own)].into_iter().chain(other).filter(|(_, weight)| *weight != 0.0);
                 for (other, weight) in both.flat_map(|(of, weight)| self.slots(of).map(move |slot| (slot, weight))) {
                     let modes = modes.map(|g| weight * g);
-                    let column = self.cluster[other];
-                    if column as usize > cluster {
+                    let column = self.cluster[other] as usize;
+                    if column > cluster {
                         continue;
                     }
                     work::add(2 * MODES * MODES, size_of::<[f64; MODES]>());
-                    let at = columns.iter().position(|c| *c == column).unwrap_or_else(|| {
-                        blocks.push([0.0; MODES * MODES]);
-                        columns.push(column);
-                        columns.len() - 1
-                    });
-                    for (a, products) in modes.iter().zip(blocks[at].as_chunks_mut::<MODES>().0) {
-                        products.iter_mut().zip(&self.modes[other]).for_each(|(p, b)| *p += a * b);
-                    }
+                    add_product(blocks.at((cluster, column)), &modes, &self.modes[other]);
                 }
             }
-            result.push((cluster, columns.into_iter().map(|column| column as usize).zip(blocks).collect()));
+            result.extend(blocks.into_blocks());
         }
         result
     }

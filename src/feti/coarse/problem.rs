@@ -12,13 +12,14 @@ use thiserror::Error;
 use super::base::Base;
 use super::bodies::BodyMotions;
 use super::face::CoarseFace;
-use super::factor::{Block, Blocks, CoarseAnalysis, CoarseFactor};
+use super::factor::{CoarseAnalysis, CoarseFactor};
 use super::matrix::{Matrix, Rows};
 use super::sliding::Weight;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::Constraints;
 use crate::decomposition::{Clusters, Decomposition};
 use crate::feti::dual::Interconnection;
+use crate::feti::dual::blocks::{Block, Blocks, Place, add_block, pack, unpack};
 use crate::feti::dual::levels::Tree;
 use crate::feti::inverse::kernel::MODES;
 use crate::work;
@@ -180,10 +181,7 @@ impl<'a> Coarse<'a> {
     }
 
     fn products(&self, rows: Rows, weight: impl Fn(usize) -> Weight) -> Blocks {
-        let mut of_clusters = Vec::new();
-        for (row, blocks) in self.matrix.products(rows, weight) {
-            of_clusters.extend(blocks.into_iter().map(|(column, block)| ((row, column), block)));
-        }
+        let mut of_clusters = self.matrix.products(rows, weight);
         if !self.clusters.are_single() {
             of_clusters = self.brought_home(of_clusters);
         }
@@ -192,7 +190,7 @@ impl<'a> Coarse<'a> {
 
     /// Sums of the blocks that subdomains have a part in, on the rank where the row's cluster is at home, in the order of the
     /// subdomains. Collective.
-    fn brought_home(&self, parts: Vec<((usize, usize), Block)>) -> Vec<((usize, usize), Block)> {
+    fn brought_home(&self, parts: Vec<(Place, Block)>) -> Vec<(Place, Block)> {
         let mut outgoing = vec![Vec::new(); self.comm.size()];
         for part in parts {
             let home = self.tree.home(self.clusters.first(part.0.0));
@@ -307,22 +305,4 @@ impl<'a> Coarse<'a> {
 
 fn add(blocks: &mut Blocks, more: Blocks) {
     more.into_iter().for_each(|(place, product)| add_block(blocks, place, product));
-}
-
-fn add_block(blocks: &mut Blocks, place: (usize, usize), product: Block) {
-    let block = blocks.entry(place).or_insert([0.0; MODES * MODES]);
-    block.iter_mut().zip(product).for_each(|(b, p)| *b += p);
-}
-
-/// Blocks as a message.
-fn pack(blocks: &[((usize, usize), Block)]) -> Vec<u64> {
-    let numbers = |((row, column), block): &((usize, usize), Block)| {
-        [*row as u64, *column as u64].into_iter().chain(block.map(f64::to_bits)).collect::<Vec<_>>()
-    };
-    blocks.iter().flat_map(numbers).collect()
-}
-
-fn unpack(message: &[u64]) -> impl Iterator<Item = ((usize, usize), Block)> {
-    let blocks = message.as_chunks::<{ 2 + MODES * MODES }>().0.iter();
-    blocks.map(|&[row, column, ref block @ ..]| ((row as usize, column as usize), block.map(f64::from_bits)))
 }

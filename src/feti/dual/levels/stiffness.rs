@@ -3,7 +3,7 @@
 //! It leaves the rigid motions of the group as a whole. So the first member is tied: `(G G')^+` gives it no motion, which is exact
 //! for forces that are in balance over the group.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -15,15 +15,13 @@ use super::motions::Transfer;
 use crate::constraint::Constraints;
 use crate::decomposition::{Clusters, Subdomain};
 use crate::feti::dual::Interconnection;
+use crate::feti::dual::blocks::{Block, Blocks, FewBlocks, Place, add_block, add_product, pack, unpack};
 use crate::feti::inverse::kernel::MODES;
 use crate::simd::vectorised;
 use crate::work;
 
 /// `G` of a row for one member.
-type OfMember = (u32, [f64; MODES]);
-type Block = [f64; MODES * MODES];
-/// Blocks between two members.
-type Blocks = BTreeMap<(u32, u32), Block>;
+type OfMember = (usize, [f64; MODES]);
 
 /// `(G G')^+` of all members but the first, by columns.
 pub struct Inverse {
@@ -68,9 +66,8 @@ impl Equalities<'_> {
         let mut known: HashMap<Vec<u64>, Option<Rc<Inverse>>> = HashMap::new();
         let blocks = self.brought_home(level, &parts);
         let of_group = |(members, blocks): (&Range<usize>, &Blocks)| {
-            let entry = |(&(row, column), block): (&(u32, u32), &Block)| {
-                let place = u64::from(row) << 32 | u64::from(column);
-                [place].into_iter().chain(block.map(f64::to_bits)).collect::<Vec<_>>()
+            let entry = |(&(row, column), block): (&Place, &Block)| {
+                [row as u64, column as u64].into_iter().chain(block.map(f64::to_bits)).collect::<Vec<_>>()
             };
             let key: Vec<u64> = [members.len() as u64].into_iter().chain(blocks.iter().flat_map(entry)).collect();
             known.entry(key).or_insert_with(|| Inverse::new(members.len(), blocks).map(Rc::new)).clone()
@@ -99,19 +96,15 @@ impl Equalities<'_> {
         gather.moved(modes_of_nodes(level - 1, motions, subdomains), |row, values| {
             let Some(of_row) = of_rows[row].filter(|of_row| *of_row >= level) else { return };
             let slots = &constraints.slot_subdomain[constraints.slots(row)];
-            let (begin, mut slot) = (all.len(), 0);
-            while slot < slots.len() {
-                let (first, member) = (slot, clusters.group(level - 1, slots[slot] as usize));
-                let mut six = values[slot];
-                slot += 1;
-                while slot < slots.len() && clusters.group(level - 1, slots[slot] as usize) == member {
-                    six.iter_mut().zip(values[slot]).for_each(|(sum, x)| *sum += x);
-                    slot += 1;
-                }
-                if let Some(own) = own(slots[first]) {
+            let (begin, mut values) = (all.len(), values.iter());
+            let member = |subdomain: u32| clusters.group(level - 1, subdomain as usize);
+            for of_member in slots.chunk_by(|&a, &b| member(a) == member(b)) {
+                let sixes = values.by_ref().take(of_member.len()).copied();
+                let six = sixes.reduce(sum).expect("no member is without a slot");
+                if let Some(own) = own(of_member[0]) {
                     add_product(&mut diagonals[own], &six, &six);
                 }
-                all.push((member as u32, six));
+                all.push((member(of_member[0]), six));
             }
             match own(slots[0]).filter(|_| of_row == level) {
                 Some(own) => rows[own].push((dofs[row], begin as u32..all.len() as u32)),
@@ -128,49 +121,34 @@ impl Equalities<'_> {
         for (subdomain, rows) in subdomains.iter().zip(&parts.rows) {
             let mut rows = rows.clone();
             rows.sort_by_key(|row| row.0);
-            // A subdomain has few pairs of neighbours.
-            let (mut places, mut blocks) = (Vec::new(), Vec::new());
+            let mut blocks = FewBlocks::default();
             for (_, members) in rows {
                 let of_row = &parts.members[members.start as usize..members.end as usize];
                 work::add(MODES * MODES * of_row.len() * (of_row.len() + 1), size_of_val(of_row));
                 for (at, (column, b)) in of_row.iter().enumerate() {
                     for (row, a) in &of_row[at..] {
-                        let place = places.iter().position(|place| *place == (*row, *column)).unwrap_or_else(|| {
-                            places.push((*row, *column));
-                            blocks.push([0.0; MODES * MODES]);
-                            blocks.len() - 1
-                        });
-                        add_product(&mut blocks[place], a, b);
+                        add_product(blocks.at((*row, *column)), a, b);
                     }
                 }
             }
             let group = clusters.group(level, subdomain.id);
-            let to = &mut outgoing[tree.home(clusters.begin(level, group))];
-            for ((row, column), block) in places.into_iter().zip(blocks) {
-                to.extend([u64::from(row), u64::from(column)]);
-                to.extend(block.map(f64::to_bits));
-            }
+            outgoing[tree.home(clusters.begin(level, group))].extend(pack(&blocks.into_blocks()));
         }
         let groups = tree.groups(level);
         let mut sums = vec![Blocks::new(); groups.len()];
         for message in tree.comm().all_to_all(outgoing) {
-            for &[row, column, ref block @ ..] in message.as_chunks::<{ 2 + MODES * MODES }>().0 {
-                let group = clusters.group(level, clusters.begin(level - 1, row as usize));
-                let begin = clusters.children(level, group).start as u64;
-                let at = ((row - begin) as u32, (column - begin) as u32);
-                let sum = sums[group - groups.start].entry(at).or_insert([0.0; MODES * MODES]);
-                sum.iter_mut().zip(block).for_each(|(sum, bits)| *sum += f64::from_bits(*bits));
+            for ((row, column), block) in unpack(&message) {
+                let group = clusters.group(level, clusters.begin(level - 1, row));
+                let begin = clusters.children(level, group).start;
+                add_block(&mut sums[group - groups.start], (row - begin, column - begin), block);
             }
         }
         sums
     }
 }
 
-/// `block += a b'`.
-fn add_product(block: &mut Block, a: &[f64; MODES], b: &[f64; MODES]) {
-    for (line, a) in block.as_chunks_mut::<MODES>().0.iter_mut().zip(a) {
-        line.iter_mut().zip(b).for_each(|(x, b)| *x += a * b);
-    }
+fn sum(a: [f64; MODES], b: [f64; MODES]) -> [f64; MODES] {
+    std::array::from_fn(|k| a[k] + b[k])
 }
 
 /// The modes of the groups of a level at the nodes of own subdomains, one component. Congruent groups have equal bits on the
@@ -192,7 +170,7 @@ impl Inverse {
         let length = MODES * (members - 1);
         let mut matrix = Mat::zeros(length, length);
         for (&(row, column), block) in blocks.iter().filter(|(place, _)| place.1 > 0) {
-            let (row, column) = (MODES * (row as usize - 1), MODES * (column as usize - 1));
+            let (row, column) = (MODES * (row - 1), MODES * (column - 1));
             for (k, x) in block.iter().enumerate() {
                 matrix[(row + k / MODES, column + k % MODES)] = *x;
             }
