@@ -1,6 +1,6 @@
 //! The coarse problem `G G' a = r` with `G = R'B'`, and what follows from it.
 //!
-//! [`matrix`] is `G`, [`problem`] what ranks make of it together. [`base`] has the [`factor`] of the equalities, on which [`face`], the
+//! [`equalities`] and [`contacts`] are `G`, [`problem`] what ranks make of it together. [`base`] has the [`factor`] of the equalities, on which [`face`], the
 //! coarse problem of the rows that hold, is built; [`projector`] is `P = I - G'(G G')^-1 G` of all rows. [`recover`] has `e = R'f` and `R alpha`, [`motion`] the
 //! `alpha` of a solution. Of rows along which surfaces slide [`sliding`] has what is kept. [`bodies`] are motions of whole bodies,
 //! [`cones`] what friction can exert on them, and [`equilibrium`] tells whether anything holds these.
@@ -8,10 +8,11 @@
 mod base;
 pub mod bodies;
 mod cones;
+mod contacts;
+mod equalities;
 pub mod equilibrium;
 pub mod face;
 pub mod factor;
-mod matrix;
 pub mod motion;
 pub mod problem;
 pub mod projector;

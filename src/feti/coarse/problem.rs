@@ -11,9 +11,10 @@ use thiserror::Error;
 
 use super::base::Base;
 use super::bodies::BodyMotions;
+use super::contacts::Contacts;
+use super::equalities::Equalities;
 use super::face::CoarseFace;
 use super::factor::{CoarseAnalysis, CoarseFactor};
-use super::matrix::{Matrix, Rows};
 use super::sliding::Weight;
 use crate::comm::{Comm, all_gather_u64};
 use crate::constraint::Constraints;
@@ -40,13 +41,14 @@ pub struct Coarse<'a> {
     comm: &'a dyn Comm,
     clusters: &'a Clusters,
     tree: &'a Tree<'a>,
-    matrix: Matrix,
+    equalities: Equalities<'a>,
+    contacts: Contacts,
     motions: BodyMotions,
     /// One over the squared length of each row, and whether rows are of unequal length.
     unit: Vec<f64>,
     uneven: bool,
     /// `G G'` of the equalities, on every rank.
-    equalities: OnceCell<Blocks>,
+    permanent: OnceCell<Blocks>,
     /// Analysis for all rows; it fits every choice of them.
     symbolic: OnceCell<Rc<CoarseAnalysis>>,
     /// Of the equalities; present once the coarse problem is set up.
@@ -59,20 +61,21 @@ impl<'a> Coarse<'a> {
     /// Computes `G = R'B'`. Nothing is solved before [`Coarse::factorise`]. Collective.
     pub fn new(
         comm: &'a dyn Comm,
-        Decomposition { clusters, subdomains, .. }: &'a Decomposition,
-        constraints: &Constraints,
+        decomposition: &'a Decomposition,
+        constraints: &'a Constraints,
         connection: &'a Interconnection<'a>,
     ) -> Self {
-        let (tree, modes) = (&connection.tree, connection.modes());
+        let tree = &connection.tree;
         Self {
             comm,
-            motions: BodyMotions::new(tree, subdomains, modes),
-            matrix: Matrix::new(clusters, subdomains, modes, constraints, &connection.gather),
-            clusters,
+            motions: BodyMotions::new(tree, &decomposition.subdomains, connection.modes()),
+            equalities: Equalities::new(decomposition, constraints, connection),
+            contacts: Contacts::new(decomposition, constraints, connection),
+            clusters: &decomposition.clusters,
             tree,
             unit: constraints.rows.iter().map(|row| (row.length * row.length).recip()).collect(),
             uneven: constraints.uneven,
-            equalities: OnceCell::new(),
+            permanent: OnceCell::new(),
             symbolic: OnceCell::new(),
             base: None,
             whole: OnceCell::new(),
@@ -85,7 +88,7 @@ impl<'a> Coarse<'a> {
     /// If all rows together leave a rigid motion free: on every rank.
     pub fn factorise(&mut self) -> Result<(), Floating> {
         self.base = Some(Rc::new(Base::of_equalities(self)?));
-        let all = CoarseFace::loose(self, vec![true; self.matrix.rows()]);
+        let all = CoarseFace::loose(self, vec![true; self.contacts.rows()]);
         all.free().first().map_or(Ok(()), |motion| {
             let most = (0..motion.len()).max_by(|&a, &b| motion[a].abs().total_cmp(&motion[b].abs()));
             Err(self.floating(most.unwrap_or(0) / MODES))
@@ -126,22 +129,22 @@ impl<'a> Coarse<'a> {
     /// Blocks of `G W G'` of the equalities and the contacts with these weights `W`, those of all ranks on every rank; lower
     /// triangle. Collective.
     pub(super) fn blocks(&self, weight: impl Fn(usize) -> Weight) -> Blocks {
-        let mut blocks = self.equalities.get_or_init(|| self.products(Rows::Equalities, |_| 1.0.into())).clone();
-        add(&mut blocks, self.products(Rows::Inequalities, weight));
+        let mut blocks = self.permanent.get_or_init(|| self.gathered(self.equalities.products(|_| 1.0))).clone();
+        add(&mut blocks, self.gathered(self.contacts.products(weight)));
         blocks
     }
 
     /// As [`Coarse::blocks`], were all rows unit vectors. Collective.
     pub(super) fn unit_blocks(&self, weight: impl Fn(usize) -> Weight) -> Blocks {
-        let mut blocks = self.products(Rows::Equalities, |row| self.unit[row].into());
-        add(&mut blocks, self.products(Rows::Inequalities, |row| self.as_unit(row, weight(row))));
+        let mut blocks = self.gathered(self.equalities.products(|row| self.unit[row]));
+        add(&mut blocks, self.gathered(self.contacts.products(|row| self.as_unit(row, weight(row)))));
         blocks
     }
 
     /// Blocks of `G W G'` of the contacts alone, and those if these rows were unit vectors. Collective.
     pub(super) fn contact_blocks(&self, weight: impl Fn(usize) -> Weight) -> [Blocks; 2] {
-        let unit = self.products(Rows::Inequalities, |row| self.as_unit(row, weight(row)));
-        [self.products(Rows::Inequalities, weight), unit]
+        let unit = self.contacts.products(|row| self.as_unit(row, weight(row)));
+        [self.contacts.products(weight), unit].map(|parts| self.gathered(parts))
     }
 
     /// The weight of a row, were it a unit vector.
@@ -168,7 +171,7 @@ impl<'a> Coarse<'a> {
 
     /// Whether any contact, on any rank, is among the kept rows. Collective.
     pub(super) fn has_contacts(&self, kept: &[bool]) -> bool {
-        !self.products(Rows::Inequalities, |row| f64::from(kept[row]).into()).is_empty()
+        !self.gathered(self.contacts.products(|row| f64::from(kept[row]).into())).is_empty()
     }
 
     /// Number of clusters.
@@ -180,8 +183,8 @@ impl<'a> Coarse<'a> {
         self.comm
     }
 
-    fn products(&self, rows: Rows, weight: impl Fn(usize) -> Weight) -> Blocks {
-        let mut of_clusters = self.matrix.products(rows, weight);
+    /// Sums of the blocks that own subdomains have a part in, those of all ranks. Collective.
+    fn gathered(&self, mut of_clusters: Vec<(Place, Block)>) -> Blocks {
         if !self.clusters.are_single() {
             of_clusters = self.brought_home(of_clusters);
         }
@@ -210,7 +213,7 @@ impl<'a> Coarse<'a> {
 
     /// `G' motion` of all rows, of six numbers a cluster. Local.
     pub fn moved(&self, motion: &[f64]) -> Vec<f64> {
-        let mut rows = vec![0.0; self.matrix.rows()];
+        let mut rows = vec![0.0; self.contacts.rows()];
         self.add_transpose(1.0, motion, &mut rows);
         rows
     }
@@ -220,18 +223,19 @@ impl<'a> Coarse<'a> {
         &self.motions
     }
 
-    /// Force of a row's unit multiplier on the bodies, six numbers each. Local.
+    /// Force of a contact's unit multiplier on the bodies, six numbers each. Local.
     pub fn force_on_bodies(&self, row: usize) -> Vec<f64> {
         let mut forces = vec![0.0; MODES * self.motions.bodies()];
-        self.matrix.forces(row).for_each(|(cluster, modes)| self.motions.add_force(cluster, modes, &mut forces));
+        self.contacts.forces(row).for_each(|(cluster, modes)| self.motions.add_force(cluster, modes, &mut forces));
         forces
     }
 
     /// `G rows`, whole on every rank. One all-gather.
     pub fn apply(&self, rows: &[f64]) -> Vec<f64> {
-        let [equalities, inequalities] = Rows::ALL.map(|part| self.matrix.resultants(part, |row| rows[row]));
-        let both = |(e, i): ([f64; MODES], [f64; MODES])| -> [f64; MODES] { std::array::from_fn(|k| e[k] + i[k]) };
-        let mine: Vec<[f64; MODES]> = equalities.zip(inequalities).map(both).collect();
+        let mut mine = self.equalities.resultants(rows);
+        for (sum, of_contacts) in mine.iter_mut().zip(self.contacts.resultants(|row| rows[row])) {
+            sum.iter_mut().zip(of_contacts).for_each(|(sum, x)| *sum += x);
+        }
         self.share(mine.as_flattened())
     }
 
@@ -245,17 +249,13 @@ impl<'a> Coarse<'a> {
         width: usize,
     ) -> ([Vec<f64>; 3], Vec<f64>) {
         let outside = |row: usize, x: &[f64]| if base.has_contact(row) { 0.0 } else { x[row] };
-        let mut equalities = self.matrix.resultants(Rows::Equalities, |row| x[row]);
-        let mut inside =
-            self.matrix.resultants(Rows::Inequalities, |row| if base.has_contact(row) { x[row] } else { 0.0 });
-        let mut contacts = self.matrix.resultants(Rows::Inequalities, |row| outside(row, x));
-        let mut beside =
-            self.matrix.resultants(Rows::Inequalities, |row| if r.is_empty() { 0.0 } else { outside(row, r) });
+        let mut inside = self.contacts.resultants(|row| if base.has_contact(row) { x[row] } else { 0.0 });
+        let mut contacts = self.contacts.resultants(|row| outside(row, x));
+        let mut beside = self.contacts.resultants(|row| if r.is_empty() { 0.0 } else { outside(row, r) });
         let length = 3 * MODES + width;
         let mut mine = Vec::with_capacity(length * self.tree.own());
-        for own in 0..self.tree.own() {
-            let (e, i) = (equalities.next().unwrap_or_default(), inside.next().unwrap_or_default());
-            mine.extend(e.iter().zip(i).map(|(e, i)| e + i));
+        for (own, e) in self.equalities.resultants(x).into_iter().enumerate() {
+            mine.extend(e.iter().zip(inside.next().unwrap_or_default()).map(|(e, i)| e + i));
             mine.extend(contacts.next().into_iter().chain(beside.next()).flatten());
             mine.extend_from_slice(&partial[width * own..][..width]);
         }
@@ -288,18 +288,19 @@ impl<'a> Coarse<'a> {
 
     /// `rows += factor G'a`. Local.
     pub fn add_transpose(&self, factor: f64, a: &[f64], rows: &mut [f64]) {
-        Rows::ALL.into_iter().for_each(|part| self.matrix.add_transpose(part, |_| true, factor, a, rows));
+        self.equalities.add_transpose(factor, a, rows);
+        self.contacts.add_transpose(|_| true, factor, a, rows);
     }
 
     /// As [`Coarse::add_transpose`], in the rows of a base. Local.
     pub(super) fn add_transpose_in(&self, base: &Base, factor: f64, a: &[f64], rows: &mut [f64]) {
-        self.matrix.add_transpose(Rows::Equalities, |_| true, factor, a, rows);
-        self.matrix.add_transpose(Rows::Inequalities, |row| base.has_contact(row), factor, a, rows);
+        self.equalities.add_transpose(factor, a, rows);
+        self.contacts.add_transpose(|row| base.has_contact(row), factor, a, rows);
     }
 
     /// As [`Coarse::add_transpose`], in the rows outside a base. Local.
     pub(super) fn add_transpose_outside(&self, base: &Base, factor: f64, a: &[f64], rows: &mut [f64]) {
-        self.matrix.add_transpose(Rows::Inequalities, |row| !base.has_contact(row), factor, a, rows);
+        self.contacts.add_transpose(|row| !base.has_contact(row), factor, a, rows);
     }
 }
 

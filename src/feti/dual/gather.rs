@@ -127,17 +127,26 @@ impl<'a> Gather<'a> {
         self.exchange(1, fill, |row, slots| rows[row] = slots.iter().fold(0.0, |sum, slot| sum + slot));
     }
 
-    /// Hands to `take` what the six modes of each slot's subdomain make of each row, given one component of the modes' displacements of
-    /// an own subdomain's node. One neighbour exchange.
-    pub fn moved(&self, modes: impl Fn(usize, usize, usize) -> [f64; 6], mut take: impl FnMut(usize, &[[f64; 6]])) {
+    /// Hands to `take` what the six modes of each slot's subdomain make of each `wanted` row, given one component of the modes'
+    /// displacements of an own subdomain's node. One neighbour exchange.
+    pub fn moved(
+        &self,
+        wanted: impl Fn(usize) -> bool,
+        modes: impl Fn(usize, usize, usize) -> [f64; 6],
+        mut take: impl FnMut(usize, &[[f64; 6]]),
+    ) {
         let fill = |own: usize, slots: &mut [f64]| {
             let slots = slots.as_chunks_mut::<6>().0;
-            for entry in &self.entries[own] {
+            for entry in self.entries[own].iter().filter(|entry| wanted(entry.row as usize)) {
                 let of_dof = modes(own, entry.dof as usize / 3, entry.dof as usize % 3);
                 slots[entry.slot as usize].iter_mut().zip(of_dof).for_each(|(sum, x)| *sum += entry.value * x);
             }
         };
-        self.exchange(6, fill, |row, slots| take(row, slots.as_chunks().0));
+        self.exchange(6, fill, |row, slots| {
+            if wanted(row) {
+                take(row, slots.as_chunks().0);
+            }
+        });
     }
 
     /// Lets `fill` add the numbers of each own subdomain to its slots, `width` a slot, and hands the slots of each row to `take`, in

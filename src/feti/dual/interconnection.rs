@@ -1,8 +1,9 @@
-//! What interconnects the torn subdomains: `B`, inner products of its rows, and `R` of all groups.
+//! What interconnects the torn subdomains: `B`, inner products of its rows, `R` of all groups, and `G` of the equalities.
 //!
 //! All follow from the decomposition and the rows alone: no material, no load.
 
 use super::gather::Gather;
+use super::levels::gluing::Gluing;
 use super::levels::{Halo, Motions, Tree};
 use super::space::RowSpace;
 use crate::comm::Comm;
@@ -22,21 +23,20 @@ pub struct Interconnection<'a> {
     pub tree: Tree<'a>,
     /// Rigid modes of subdomains and their groups.
     pub motions: Motions,
+    /// What these make of the equalities.
+    pub gluing: Gluing,
 }
 
 impl<'a> Interconnection<'a> {
     /// Of one rank's subdomains and rows. Collective.
     pub fn new(comm: &'a dyn Comm, decomposition: &Decomposition, constraints: &Constraints) -> Self {
         let Decomposition { shares, clusters, subdomains, .. } = decomposition;
-        let tree = Tree::new(comm, clusters, shares);
         let dofs = subdomains.iter().map(Subdomain::dofs).collect();
-        Self {
-            gather: Gather::new(comm, shares, constraints, dofs),
-            space: RowSpace::new(comm, shares, constraints),
-            halo: Halo::new(comm, shares, constraints),
-            motions: Motions::new(&tree, subdomains),
-            tree,
-        }
+        let (tree, halo) = (Tree::new(comm, clusters, shares), Halo::new(comm, shares, constraints));
+        let (gather, motions) = (Gather::new(comm, shares, constraints, dofs), Motions::new(&tree, subdomains));
+        let gluing = Gluing::new((&gather, &halo, &tree, &motions), (clusters, subdomains), constraints);
+        let space = RowSpace::new(comm, shares, constraints);
+        Self { gather, space, halo, tree, motions, gluing }
     }
 
     /// `R`: rigid modes of each own subdomain, those of its cluster.

@@ -37,7 +37,7 @@ impl RigidModes {
     /// These modes as sums of those of some of their nodes, `[mode of the part][mode]`.
     pub fn in_modes_of(&self, part: &Self) -> [[f64; MODES]; MODES] {
         let mut matrix = [[0.0; MODES]; MODES];
-        let arm = difference(part.centre, self.centre);
+        let arm = self.arm(part);
         for (k, axis) in self.axes.iter().enumerate() {
             matrix[k][k] = self.translation / part.translation;
             let way = cross(*axis, arm);
@@ -54,6 +54,11 @@ impl RigidModes {
     /// Unit translations, and unit rotations about the axes of coordinates through the same centre.
     pub fn plain(&self) -> Self {
         Self { centre: self.centre, translation: 1.0, axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
+    }
+
+    /// How far the centre of some of their nodes, those of `part`, is from their own.
+    pub fn arm(&self, part: &Self) -> [f64; 3] {
+        difference(part.centre, self.centre)
     }
 
     /// `R'v` from the force and the moment of `v`: what the [`RigidModes::plain`] modes make of it.
@@ -119,6 +124,19 @@ impl RigidModes {
             u.iter_mut().zip([x, y, z]).zip(turned).for_each(|((u, t), r)| *u += t + r);
         }
     }
+}
+
+/// A force and its moment about a point, with the moment about another one that is an `arm` before it.
+pub fn moved_force([x, y, z, a, b, c]: [f64; MODES], arm: [f64; 3]) -> [f64; MODES] {
+    let turning = cross(arm, [x, y, z]);
+    [x, y, z, a + turning[0], b + turning[1], c + turning[2]]
+}
+
+/// A translation and a rotation about a point, as those about another one that is an `arm` behind it.
+pub fn moved_motion([x, y, z, rotation @ ..]: [f64; MODES], arm: [f64; 3]) -> [f64; MODES] {
+    let [a, b, c] = rotation;
+    let turned = cross(rotation, arm);
+    [x + turned[0], y + turned[1], z + turned[2], a, b, c]
 }
 
 /// The centroid of points and their inertia tensor about it.

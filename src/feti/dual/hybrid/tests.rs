@@ -1,6 +1,5 @@
 use faer::{Mat, Side};
 
-use crate::feti::dual::levels::gluing;
 use crate::feti::inverse::kernel::MODES;
 use crate::fixture::{Setup, assert_close, block_diagonal, column, dense, on_ranks, same_on_any_ranks, two_bricks};
 use crate::scene::Scene;
@@ -32,7 +31,7 @@ fn modes(setup: &Setup, level: usize) -> Mat<f64> {
 fn bonds(setup: &Setup) -> Mat<f64> {
     let (b, clusters) = (setup.dense_rows(), &setup.discrete.decomposition.clusters);
     let of_level = |level: usize| {
-        let is_of = |row: usize| gluing::level(clusters, &setup.discrete.constraints, row) == Some(level);
+        let is_of = |row: usize| setup.connection.gluing.level(row) == Some(level);
         let rows = Mat::from_fn(b.nrows(), b.ncols(), |i, j| if is_of(i) { b[(i, j)] } else { 0.0 });
         rows.transpose() * (&rows * modes(setup, level - 1))
     };

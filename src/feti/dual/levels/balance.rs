@@ -13,7 +13,7 @@ use std::rc::Rc;
 
 use faer::{Mat, Side};
 
-use super::gluing::{self, Gluing};
+use super::gluing::Gluing;
 use super::halo::Halo;
 use super::motions::Transfer;
 use super::stiffness::{Equalities, Inverse, OfLevel, TOGETHER};
@@ -29,7 +29,7 @@ pub struct Balance<'a> {
     tree: &'a Tree<'a>,
     motions: &'a Motions,
     halo: &'a Halo<'a>,
-    gluing: Gluing<'a>,
+    gluing: &'a Gluing,
     levels: Vec<Level>,
     /// For each level, from 0, the inverses of the diagonal blocks of `G G'` of its groups that are at home here.
     diagonals: Vec<Vec<Transfer>>,
@@ -53,11 +53,8 @@ impl<'a> Balance<'a> {
         constraints: &Constraints,
     ) -> Result<Self, usize> {
         let Decomposition { clusters, subdomains, .. } = decomposition;
-        let Interconnection { space, halo, tree, motions, .. } = connection;
-        let of_rows: Vec<_> =
-            (0..constraints.rows.len()).map(|row| gluing::level(clusters, constraints, row)).collect();
-        let gluing = Gluing::new((connection, subdomains), constraints, &of_rows);
-        let equalities = Equalities { clusters, connection, subdomains, constraints, of_rows: &of_rows };
+        let Interconnection { space, halo, tree, motions, gluing, .. } = connection;
+        let equalities = Equalities { clusters, connection, subdomains, constraints };
         let (mut levels, mut diagonals) = (Vec::new(), Vec::new());
         for level in 1..=clusters.levels() {
             let OfLevel { inverses, diagonals: of_members } = equalities.of_level(level);
@@ -76,12 +73,13 @@ impl<'a> Balance<'a> {
     /// balance over each cluster; zero in other rows. Collective.
     pub fn forces(&self, mut resultants: Vec<f64>, forces: &mut [f64]) {
         forces.fill(0.0);
+        let modes = &self.motions.shapes[..];
         for level in (1..=self.levels.len()).rev() {
             let x = self.solve(level, &resultants);
-            self.gluing.add_moved(self.halo, level..=level, 1.0, &x, forces);
+            self.gluing.add_moved((self.halo, modes), level..=level, 1.0, &x, forces);
             if level > 1 {
                 let mut taken = vec![0.0; resultants.len()];
-                self.gluing.add_resultants(level..=level, forces, &mut taken);
+                self.gluing.add_resultants(modes, level..=level, forces, &mut taken);
                 resultants.iter_mut().zip(taken).for_each(|(r, t)| *r -= t);
             }
         }
@@ -90,13 +88,13 @@ impl<'a> Balance<'a> {
     /// Rigid motions of own subdomains, six numbers each, that bring the jumps of the rows inside clusters nearest to zero, level by
     /// level; those of clusters are left as they are. Jumps are those beside the motions then. Collective.
     pub fn motions(&self, jumps: &mut [f64]) -> Vec<f64> {
-        let mut motions = vec![0.0; MODES * self.tree.own()];
+        let (mut motions, modes) = (vec![0.0; MODES * self.tree.own()], &self.motions.shapes[..]);
         for level in 1..=self.levels.len() {
             if level > 1 {
-                self.gluing.add_moved(self.halo, level..=level, -1.0, &motions, jumps);
+                self.gluing.add_moved((self.halo, modes), level..=level, -1.0, &motions, jumps);
             }
             let mut sums = vec![0.0; motions.len()];
-            self.gluing.add_resultants(level..=level, jumps, &mut sums);
+            self.gluing.add_resultants(modes, level..=level, jumps, &mut sums);
             motions.iter_mut().zip(self.solve(level, &sums)).for_each(|(a, x)| *a += x);
         }
         motions
@@ -115,14 +113,14 @@ impl<'a> Balance<'a> {
 
     fn relax_level(&self, level: usize, rows: &mut [f64]) {
         let above = level + 1..=self.levels.len() + 1;
-        let mut sums = vec![0.0; MODES * self.tree.own()];
-        self.gluing.add_resultants(above.clone(), rows, &mut sums);
+        let (mut sums, modes) = (vec![0.0; MODES * self.tree.own()], &self.motions.shapes[..]);
+        self.gluing.add_resultants(modes, above.clone(), rows, &mut sums);
         let mut motions = self.sums(level, &sums);
         book(&self.diagonals[level]);
         for (six, inverse) in motions.as_chunks_mut::<MODES>().0.iter_mut().zip(&self.diagonals[level]) {
             *six = inverse.map(|line| line.iter().zip(&*six).map(|(a, x)| a * x).sum());
         }
-        self.gluing.add_moved(self.halo, above, -1.0, &self.of_members(level, motions), rows);
+        self.gluing.add_moved((self.halo, modes), above, -1.0, &self.of_members(level, motions), rows);
     }
 
     /// Motions `(G G')^+ r` of the members of the groups of a level, as motions of own subdomains; `r` are six numbers an own subdomain,

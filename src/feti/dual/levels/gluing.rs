@@ -6,115 +6,95 @@
 use std::ops::RangeInclusive;
 
 use super::halo::Halo;
+use super::levers::{Levers, Six};
+use super::{Motions, Tree};
 use crate::constraint::{Constraints, Kind};
 use crate::decomposition::{Clusters, Subdomain};
-use crate::feti::dual::Interconnection;
+use crate::feti::dual::gather::Gather;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
-use crate::work;
 
 /// `G` of one rank's equalities.
-pub struct Gluing<'a> {
-    /// For each level the rows of each component of the displacement.
-    levels: Vec<[Rows; 3]>,
-    /// Modes of own subdomains, in terms of their shapes.
-    modes: &'a [RigidModes],
+pub struct Gluing {
+    /// For each level its rows, with forces and moments about the centres of subdomains.
+    levels: Vec<Levers>,
+    /// The level of each row, from 1; 0 for contacts.
+    of_rows: Vec<u8>,
+    /// Number of own subdomains.
+    own: usize,
 }
 
-/// Rows that compare one component of copies.
-#[derive(Default)]
-struct Rows {
-    rows: Vec<u32>,
-    /// First slot of each row, and the end.
-    begin: Vec<u32>,
-    /// For each slot the place of its subdomain ([`Halo::place`]).
-    subdomain: Vec<u32>,
-    /// The slot's force along the component, and its moments about the two axes after it.
-    lever: Vec<[f64; 3]>,
-}
-
-impl<'a> Gluing<'a> {
-    /// Of the rows of this rank, given the level of each. One neighbour exchange.
+impl Gluing {
+    /// Of the rows of this rank. A neighbour exchange for what is within groups, and one for what is above.
     pub fn new(
-        (connection, subdomains): (&'a Interconnection, &[Subdomain]),
+        (gather, halo, tree, motions): (&Gather, &Halo, &Tree, &Motions),
+        (clusters, subdomains): (&Clusters, &[Subdomain]),
         constraints: &Constraints,
-        of_rows: &[Option<usize>],
     ) -> Self {
-        let Interconnection { gather, halo, tree, motions, .. } = connection;
-        let none = || [(); 3].map(|()| Rows { begin: vec![0], ..Rows::default() });
-        let mut levels: Vec<[Rows; 3]> = (0..=tree.levels()).map(|_| none()).collect();
-        let modes = &motions.shapes[..];
-        let plain: Vec<RigidModes> = modes.iter().map(RigidModes::plain).collect();
-        gather.moved(
-            |own, node, axis| plain[own].along(axis, subdomains[own].shape[node]),
-            |row, values| {
-                let Some(level) = of_rows[row] else { return };
-                let axis = constraints.rows[row].terms[0].axis;
-                let of = &mut levels[level - 1][axis];
-                of.rows.push(row as u32);
-                of.subdomain.extend(constraints.slots(row).map(|slot| halo.place(constraints.slot_subdomain[slot])));
-                of.lever.extend(values.iter().map(|six| places(axis).map(|k| six[k])));
-                of.begin.push(of.subdomain.len() as u32);
-            },
-        );
-        Self { levels, modes }
+        let level_of = |row| level(clusters, constraints, row).map_or(0, |level| level as u8);
+        let of_rows: Vec<u8> = (0..constraints.rows.len()).map(level_of).collect();
+        let mut levels: Vec<Levers> = (0..=tree.levels()).map(|_| Levers::default()).collect();
+        let plain = |modes: &[RigidModes]| modes.iter().map(RigidModes::plain).collect::<Vec<_>>();
+        let mut add = |is_mine: &dyn Fn(u8) -> bool, of_dof: &dyn Fn(usize, usize, usize) -> Six| {
+            let is_mine = |row: usize| is_mine(of_rows[row]);
+            gather.moved(is_mine, of_dof, |row, values| {
+                let places = constraints.slots(row).map(|slot| halo.place(constraints.slot_subdomain[slot]));
+                levels[of_rows[row] as usize - 1].push(row, places.zip(values.iter().copied()));
+            });
+        };
+        // Congruent members of groups have equal bits. Clusters are where they are, as loads and displacements are.
+        let (groups, above) = (tree.levels() as u8, tree.levels() as u8 + 1);
+        let (by_shape, by_place) = (plain(&motions.shapes), plain(&motions.levels[0]));
+        if groups > 0 {
+            let of_dof = |own: usize, node: usize, axis| by_shape[own].along(axis, subdomains[own].shape[node]);
+            add(&|level| (1..=groups).contains(&level), &of_dof);
+        }
+        add(&|level| level == above, &|own, node, axis| by_place[own].along(axis, subdomains[own].points[node]));
+        Self { levels, of_rows, own: subdomains.len() }
     }
 
-    /// `sums += G rows` for own subdomains, by the rows of some levels.
-    pub fn add_resultants(&self, levels: RangeInclusive<usize>, rows: &[f64], sums: &mut [f64]) {
-        let mut forces = vec![[0.0; MODES]; self.modes.len()];
-        for (axis, of) in self.of_levels(levels) {
-            let [force, first, second] = places(axis);
-            for (&row, slots) in of.rows.iter().zip(of.begin.windows(2)) {
-                let x = rows[row as usize];
-                for slot in slots[0] as usize..slots[1] as usize {
-                    if let Some(sum) = forces.get_mut(of.subdomain[slot] as usize) {
-                        let lever = of.lever[slot];
-                        sum[force] += x * lever[0];
-                        sum[first] += x * lever[1];
-                        sum[second] += x * lever[2];
-                    }
-                }
-            }
-        }
-        for ((sum, modes), force) in sums.as_chunks_mut::<MODES>().0.iter_mut().zip(self.modes).zip(forces) {
+    /// The level of a row, if it always holds.
+    pub fn level(&self, row: usize) -> Option<usize> {
+        Some(self.of_rows[row] as usize).filter(|level| *level > 0)
+    }
+
+    /// Forces and moments of the rows of some levels on own subdomains, about the centres of these.
+    pub fn forces(&self, levels: RangeInclusive<usize>, rows: &[f64]) -> Vec<Six> {
+        let mut forces = vec![[0.0; MODES]; self.own];
+        self.levels[levels.start() - 1..*levels.end()].iter().for_each(|of| of.add_forces(rows, &mut forces));
+        forces
+    }
+
+    /// `sums += G rows` for own subdomains with these modes, by the rows of some levels.
+    pub fn add_resultants(&self, modes: &[RigidModes], levels: RangeInclusive<usize>, rows: &[f64], sums: &mut [f64]) {
+        let forces = self.forces(levels, rows);
+        for ((sum, modes), force) in sums.as_chunks_mut::<MODES>().0.iter_mut().zip(modes).zip(forces) {
             sum.iter_mut().zip(modes.of_force(force)).for_each(|(sum, x)| *sum += x);
         }
     }
 
-    /// `rows += factor G'a` in the rows of some levels, of six numbers an own subdomain. One neighbour exchange.
-    pub fn add_moved(&self, halo: &Halo, levels: RangeInclusive<usize>, factor: f64, a: &[f64], rows: &mut [f64]) {
-        let motions = a.as_chunks::<MODES>().0.iter().zip(self.modes);
+    /// `rows += factor` times the jumps that motions make in the rows of some levels: translations, and rotations about the centres of
+    /// subdomains, by place.
+    pub fn add_jumps(&self, levels: RangeInclusive<usize>, factor: f64, motions: &[Six], rows: &mut [f64]) {
+        self.levels[levels.start() - 1..*levels.end()].iter().for_each(|of| of.add_jumps(factor, motions, rows));
+    }
+
+    /// `rows += factor G'a` in the rows of some levels, of six numbers an own subdomain with these modes. One neighbour exchange.
+    pub fn add_moved(
+        &self,
+        (halo, modes): (&Halo, &[RigidModes]),
+        levels: RangeInclusive<usize>,
+        factor: f64,
+        a: &[f64],
+        rows: &mut [f64],
+    ) {
+        let motions = a.as_chunks::<MODES>().0.iter().zip(modes);
         let mut motions: Vec<f64> = motions.flat_map(|(a, modes)| modes.to_motion(*a)).collect();
         halo.fill(&mut motions, MODES);
-        let motions = motions.as_chunks::<MODES>().0;
-        for (axis, of) in self.of_levels(levels) {
-            let [way, first, second] = places(axis);
-            for (&row, slots) in of.rows.iter().zip(of.begin.windows(2)) {
-                let mut sum = 0.0;
-                for slot in slots[0] as usize..slots[1] as usize {
-                    let (lever, motion) = (of.lever[slot], &motions[of.subdomain[slot] as usize]);
-                    sum += lever[0] * motion[way] + lever[1] * motion[first] + lever[2] * motion[second];
-                }
-                rows[row as usize] += factor * sum;
-            }
-        }
-    }
-
-    /// The rows of some levels and their components, for a product with `G` or `G'`.
-    fn of_levels(&self, levels: RangeInclusive<usize>) -> impl Iterator<Item = (usize, &Rows)> {
-        let of_levels = self.levels[levels.start() - 1..*levels.end()].iter();
-        let of_axes = of_levels.flat_map(|of_axes| of_axes.iter().enumerate());
-        of_axes.inspect(|(_, of)| work::each(of.lever.len(), 6, size_of::<[f64; 3]>() + size_of::<u32>()))
+        self.add_jumps(levels, factor, motions.as_chunks::<MODES>().0, rows);
     }
 }
 
-/// Which of the six numbers of a force and its moment one along this axis has.
-fn places(axis: usize) -> [usize; 3] {
-    [axis, 3 + (axis + 1) % 3, 3 + (axis + 2) % 3]
-}
-
-/// The level of a row that always holds.
-pub fn level(clusters: &Clusters, constraints: &Constraints, row: usize) -> Option<usize> {
+fn level(clusters: &Clusters, constraints: &Constraints, row: usize) -> Option<usize> {
     let slots = &constraints.slot_subdomain[constraints.slots(row)];
     let is_within = |level: &usize| {
         let group = |subdomain: u32| clusters.group(*level, subdomain as usize);

@@ -1,12 +1,13 @@
 //! What holds together in groups of subdomains ([`Clusters`](crate::decomposition::Clusters)), level by level.
 //!
 //! [`tree`] carries numbers between subdomains and their groups, which ranks may share, [`halo`] between neighbouring subdomains.
-//! [`motions`] has the rigid modes of groups. [`gluing`] is `G` of the rows inside clusters, [`stiffness`] its products, and
+//! [`motions`] has the rigid modes of groups. [`gluing`] is `G` of the equalities, kept as [`levers`], [`stiffness`] its products, and
 //! [`balance`] balances the members of each group by them.
 
 pub mod balance;
 pub mod gluing;
 pub mod halo;
+pub mod levers;
 pub mod motions;
 pub mod stiffness;
 pub mod tree;

@@ -36,8 +36,6 @@ pub struct Equalities<'s> {
     pub connection: &'s Interconnection<'s>,
     pub subdomains: &'s [Subdomain],
     pub constraints: &'s Constraints,
-    /// The level of each row ([`super::gluing::level`]).
-    pub of_rows: &'s [Option<usize>],
 }
 
 /// The members of the groups of one level, which are of the level below.
@@ -80,8 +78,8 @@ impl Equalities<'_> {
 
     /// A row counts for the first subdomain that it is of, in a member for the first of the member. One neighbour exchange.
     fn parts(&self, level: usize) -> Parts {
-        let Self { clusters, connection, subdomains, constraints, of_rows } = self;
-        let Interconnection { gather, motions, .. } = connection;
+        let Self { clusters, connection, subdomains, constraints } = self;
+        let Interconnection { gather, motions, gluing, .. } = connection;
         let first = subdomains.first().map_or(0, |s| s.id);
         let own = |subdomain: u32| (subdomain as usize).checked_sub(first).filter(|&own| own < subdomains.len());
         let (mut rows, mut all) = (vec![Vec::new(); subdomains.len()], Vec::new());
@@ -93,8 +91,8 @@ impl Equalities<'_> {
                 dofs[entry.row as usize] = entry.dof;
             }
         }
-        gather.moved(modes_of_nodes(level - 1, motions, subdomains), |row, values| {
-            let Some(of_row) = of_rows[row].filter(|of_row| *of_row >= level) else { return };
+        let is_above = |row| gluing.level(row) >= Some(level);
+        gather.moved(is_above, modes_of_nodes(level - 1, motions, subdomains), |row, values| {
             let slots = &constraints.slot_subdomain[constraints.slots(row)];
             let (begin, mut values) = (all.len(), values.iter());
             let member = |subdomain: u32| clusters.group(level - 1, subdomain as usize);
@@ -106,7 +104,7 @@ impl Equalities<'_> {
                 }
                 all.push((member(of_member[0]), six));
             }
-            match own(slots[0]).filter(|_| of_row == level) {
+            match own(slots[0]).filter(|_| gluing.level(row) == Some(level)) {
                 Some(own) => rows[own].push((dofs[row], begin as u32..all.len() as u32)),
                 None => all.truncate(begin),
             }

@@ -1,0 +1,153 @@
+//! Rows as forces on subdomains: along one component of the displacement a slot has three of six numbers, its force and its moments about
+//! the two other axes.
+//!
+//! A row that acts along several components is among the rows of each of them, with a part of its moments.
+
+use crate::feti::inverse::kernel::MODES;
+use crate::work;
+
+/// Six numbers of a force and its moment, or of a translation and a rotation.
+pub type Six = [f64; MODES];
+
+/// Some rows of one rank.
+#[derive(Default)]
+pub struct Levers([AlongAxis; 3]);
+
+/// Those along one component.
+#[derive(Default)]
+struct AlongAxis {
+    rows: Vec<u32>,
+    /// Last slot of each row, and one more.
+    ends: Vec<u32>,
+    /// For each slot the place of its subdomain ([`super::Halo::place`]).
+    places: Vec<u32>,
+    /// The slot's force, and its moments about the two axes after its own.
+    levers: Vec<[f64; 3]>,
+}
+
+/// Which of the six numbers of a force along an axis are not zero.
+const fn of_axis(axis: usize) -> [usize; 3] {
+    [axis, 3 + (axis + 1) % 3, 3 + (axis + 2) % 3]
+}
+
+impl Levers {
+    /// Adds a row, with the place and the force of each of its slots.
+    pub fn push(&mut self, row: usize, slots: impl Iterator<Item = (u32, Six)> + Clone) {
+        let mut left: Vec<Six> = slots.clone().map(|(_, force)| force).collect();
+        // Forces along an axis take their moments with them; a couple without a force is anyone's.
+        for of_axis_alone in [true, false] {
+            for axis in 0..3 {
+                let entries = of_axis(axis);
+                let told = if of_axis_alone { &entries[..1] } else { &entries[..] };
+                if !left.iter().any(|force| told.iter().any(|&k| force[k] != 0.0)) {
+                    continue;
+                }
+                let of = &mut self.0[axis];
+                of.rows.push(row as u32);
+                of.places.extend(slots.clone().map(|(place, _)| place));
+                of.levers.extend(left.iter_mut().map(|force| entries.map(|k| std::mem::take(&mut force[k]))));
+                of.ends.push(of.places.len() as u32);
+            }
+        }
+    }
+
+    /// `forces += ` what the rows `x` exert on own subdomains, which have the first places.
+    pub fn add_forces(&self, x: &[f64], forces: &mut [Six]) {
+        self.0[0].add_forces::<0>(x, forces);
+        self.0[1].add_forces::<1>(x, forces);
+        self.0[2].add_forces::<2>(x, forces);
+    }
+
+    /// `rows += factor` times the jumps that these motions make, given by place.
+    pub fn add_jumps(&self, factor: f64, motions: &[Six], rows: &mut [f64]) {
+        self.0[0].add_jumps::<0>(factor, motions, rows);
+        self.0[1].add_jumps::<1>(factor, motions, rows);
+        self.0[2].add_jumps::<2>(factor, motions, rows);
+    }
+}
+
+impl AlongAxis {
+    /// The rows with their slots.
+    fn rows(&self) -> impl Iterator<Item = (usize, &[u32], &[[f64; 3]])> {
+        work::each(self.levers.len(), 6, size_of::<[f64; 3]>() + size_of::<u32>());
+        let mut begin = 0;
+        self.rows.iter().zip(&self.ends).map(move |(&row, &end)| {
+            let slots = begin..end as usize;
+            begin = slots.end;
+            (row as usize, &self.places[slots.clone()], &self.levers[slots])
+        })
+    }
+
+    fn add_forces<const AXIS: usize>(&self, x: &[f64], forces: &mut [Six]) {
+        let [force, first, second] = const { of_axis(AXIS) };
+        for (row, places, levers) in self.rows() {
+            let x = x[row];
+            for (&place, lever) in places.iter().zip(levers) {
+                if let Some(sum) = forces.get_mut(place as usize) {
+                    sum[force] += x * lever[0];
+                    sum[first] += x * lever[1];
+                    sum[second] += x * lever[2];
+                }
+            }
+        }
+    }
+
+    fn add_jumps<const AXIS: usize>(&self, factor: f64, motions: &[Six], rows: &mut [f64]) {
+        let [way, first, second] = const { of_axis(AXIS) };
+        for (row, places, levers) in self.rows() {
+            let mut jump = 0.0;
+            for (&place, lever) in places.iter().zip(levers) {
+                let motion = &motions[place as usize];
+                jump += lever[0] * motion[way] + lever[1] * motion[first] + lever[2] * motion[second];
+            }
+            rows[row] += factor * jump;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// Rows along one axis, along several, and couples; some slots are of other ranks.
+    #[test]
+    fn sums_are_those_of_all_six_numbers() {
+        let mut random = Random::new(5);
+        let masks: [[usize; MODES]; 6] = [
+            [1, 0, 0, 0, 1, 1],
+            [0, 1, 0, 1, 0, 1],
+            [0, 0, 1, 1, 1, 0],
+            [1; 6],
+            [0, 1, 1, 1, 1, 1],
+            [0, 0, 0, 1, 0, 1],
+        ];
+        let (own, all) = (3, 5);
+        let mut six = |mask: [usize; MODES]| mask.map(|m| m as f64 * random.number());
+        let rows: Vec<Vec<(u32, Six)>> = (0..24)
+            .map(|row| (0..2 + row % 3).map(|slot| (((row + slot) % all) as u32, six(masks[row % 6]))).collect())
+            .collect();
+        let motions: Vec<Six> = (0..all).map(|_| six([1; MODES])).collect();
+        let mut levers = Levers::default();
+        rows.iter().enumerate().for_each(|(row, slots)| levers.push(row, slots.iter().copied()));
+
+        let x: Vec<f64> = (0..rows.len()).map(|row| 1.0 + row as f64).collect();
+        let mut forces = vec![[1.0; MODES]; own];
+        levers.add_forces(&x, &mut forces);
+        let mut expected = vec![[1.0; MODES]; all];
+        for ((place, force), x) in rows.iter().zip(&x).flat_map(|(slots, x)| slots.iter().map(move |slot| (slot, x))) {
+            (0..MODES).for_each(|k| expected[*place as usize][k] += x * force[k]);
+        }
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
+        assert!(forces.as_flattened().iter().zip(expected.as_flattened()).all(|(&a, &b)| near(a, b)));
+
+        let mut jumps = x.clone();
+        levers.add_jumps(-2.0, &motions, &mut jumps);
+        for ((slots, x), jump) in rows.iter().zip(x).zip(jumps) {
+            let of_slot = |(place, force): &(u32, Six)| -> f64 {
+                motions[*place as usize].iter().zip(force).map(|(a, b)| a * b).sum()
+            };
+            assert!(near(jump, x - 2.0 * slots.iter().map(of_slot).sum::<f64>()));
+        }
+    }
+}
