@@ -78,11 +78,6 @@ impl Contacts {
         }
     }
 
-    /// Number of rows of `B` on this rank.
-    pub fn rows(&self) -> usize {
-        self.begin.len() - 1
-    }
-
     /// Slots of a row of `B`.
     fn slots(&self, row: usize) -> Range<usize> {
         self.begin[row] as usize..self.begin[row + 1] as usize

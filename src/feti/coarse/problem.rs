@@ -88,7 +88,7 @@ impl<'a> Coarse<'a> {
     /// If all rows together leave a rigid motion free: on every rank.
     pub fn factorise(&mut self) -> Result<(), Floating> {
         self.base = Some(Rc::new(Base::of_equalities(self)?));
-        let all = CoarseFace::loose(self, vec![true; self.contacts.rows()]);
+        let all = CoarseFace::loose(self, vec![true; self.unit.len()]);
         all.free().first().map_or(Ok(()), |motion| {
             let most = (0..motion.len()).max_by(|&a, &b| motion[a].abs().total_cmp(&motion[b].abs()));
             Err(self.floating(most.unwrap_or(0) / MODES))
@@ -213,7 +213,7 @@ impl<'a> Coarse<'a> {
 
     /// `G' motion` of all rows, of six numbers a cluster. Local.
     pub fn moved(&self, motion: &[f64]) -> Vec<f64> {
-        let mut rows = vec![0.0; self.contacts.rows()];
+        let mut rows = vec![0.0; self.unit.len()];
         self.add_transpose(1.0, motion, &mut rows);
         rows
     }

@@ -8,7 +8,7 @@
 //! Of one group of all subdomains this is the projector of Total FETI; of nested ones it costs as much, and iterations grow
 //! slowly with the size of the groups.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::rc::Rc;
 
 use faer::{Mat, Side};
@@ -73,13 +73,11 @@ impl<'a> Balance<'a> {
     /// balance over each cluster; zero in other rows. Collective.
     pub fn forces(&self, mut resultants: Vec<f64>, forces: &mut [f64]) {
         forces.fill(0.0);
-        let modes = &self.motions.shapes[..];
         for level in (1..=self.levels.len()).rev() {
             let x = self.solve(level, &resultants);
-            self.gluing.add_moved((self.halo, modes), level..=level, 1.0, &x, forces);
+            self.add_moved(level..=level, 1.0, &x, forces);
             if level > 1 {
-                let mut taken = vec![0.0; resultants.len()];
-                self.gluing.add_resultants(modes, level..=level, forces, &mut taken);
+                let taken = self.resultants(level..=level, forces);
                 resultants.iter_mut().zip(taken).for_each(|(r, t)| *r -= t);
             }
         }
@@ -88,13 +86,12 @@ impl<'a> Balance<'a> {
     /// Rigid motions of own subdomains, six numbers each, that bring the jumps of the rows inside clusters nearest to zero, level by
     /// level; those of clusters are left as they are. Jumps are those beside the motions then. Collective.
     pub fn motions(&self, jumps: &mut [f64]) -> Vec<f64> {
-        let (mut motions, modes) = (vec![0.0; MODES * self.tree.own()], &self.motions.shapes[..]);
+        let mut motions = vec![0.0; MODES * self.tree.own()];
         for level in 1..=self.levels.len() {
             if level > 1 {
-                self.gluing.add_moved((self.halo, modes), level..=level, -1.0, &motions, jumps);
+                self.add_moved(level..=level, -1.0, &motions, jumps);
             }
-            let mut sums = vec![0.0; motions.len()];
-            self.gluing.add_resultants(modes, level..=level, jumps, &mut sums);
+            let sums = self.resultants(level..=level, jumps);
             motions.iter_mut().zip(self.solve(level, &sums)).for_each(|(a, x)| *a += x);
         }
         motions
@@ -113,14 +110,26 @@ impl<'a> Balance<'a> {
 
     fn relax_level(&self, level: usize, rows: &mut [f64]) {
         let above = level + 1..=self.levels.len() + 1;
-        let (mut sums, modes) = (vec![0.0; MODES * self.tree.own()], &self.motions.shapes[..]);
-        self.gluing.add_resultants(modes, above.clone(), rows, &mut sums);
-        let mut motions = self.sums(level, &sums);
+        let mut motions = self.sums(level, &self.resultants(above.clone(), rows));
         book(&self.diagonals[level]);
         for (six, inverse) in motions.as_chunks_mut::<MODES>().0.iter_mut().zip(&self.diagonals[level]) {
             *six = inverse.map(|line| line.iter().zip(&*six).map(|(a, x)| a * x).sum());
         }
-        self.gluing.add_moved((self.halo, modes), above, -1.0, &self.of_members(level, motions), rows);
+        self.add_moved(above, -1.0, &self.of_members(level, motions), rows);
+    }
+
+    /// `G rows` for own subdomains, by the rows of some levels.
+    fn resultants(&self, levels: RangeInclusive<usize>, rows: &[f64]) -> Vec<f64> {
+        let forces = self.gluing.forces(levels, rows).into_iter().zip(&self.motions.shapes);
+        forces.flat_map(|(force, modes)| modes.of_force(force)).collect()
+    }
+
+    /// `rows += factor G'a` in the rows of some levels, of six numbers an own subdomain. One neighbour exchange.
+    fn add_moved(&self, levels: RangeInclusive<usize>, factor: f64, a: &[f64], rows: &mut [f64]) {
+        let motions = a.as_chunks::<MODES>().0.iter().zip(&self.motions.shapes);
+        let mut motions: Vec<f64> = motions.flat_map(|(a, modes)| modes.to_motion(*a)).collect();
+        self.halo.fill(&mut motions, MODES);
+        self.gluing.add_jumps(levels, factor, motions.as_chunks::<MODES>().0, rows);
     }
 
     /// Motions `(G G')^+ r` of the members of the groups of a level, as motions of own subdomains; `r` are six numbers an own subdomain,

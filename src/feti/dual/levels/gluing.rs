@@ -34,9 +34,9 @@ impl Gluing {
         let of_rows: Vec<u8> = (0..constraints.rows.len()).map(level_of).collect();
         let mut levels: Vec<Levers> = (0..=tree.levels()).map(|_| Levers::default()).collect();
         let plain = |modes: &[RigidModes]| modes.iter().map(RigidModes::plain).collect::<Vec<_>>();
-        let mut add = |is_mine: &dyn Fn(u8) -> bool, of_dof: &dyn Fn(usize, usize, usize) -> Six| {
-            let is_mine = |row: usize| is_mine(of_rows[row]);
-            gather.moved(is_mine, of_dof, |row, values| {
+        let mut add = |of: RangeInclusive<u8>, of_dof: &dyn Fn(usize, usize, usize) -> Six| {
+            let is_of = |row: usize| of.contains(&of_rows[row]);
+            gather.moved(is_of, of_dof, |row, values| {
                 let places = constraints.slots(row).map(|slot| halo.place(constraints.slot_subdomain[slot]));
                 levels[of_rows[row] as usize - 1].push(row, places.zip(values.iter().copied()));
             });
@@ -45,10 +45,9 @@ impl Gluing {
         let (groups, above) = (tree.levels() as u8, tree.levels() as u8 + 1);
         let (by_shape, by_place) = (plain(&motions.shapes), plain(&motions.levels[0]));
         if groups > 0 {
-            let of_dof = |own: usize, node: usize, axis| by_shape[own].along(axis, subdomains[own].shape[node]);
-            add(&|level| (1..=groups).contains(&level), &of_dof);
+            add(1..=groups, &|own, node, axis| by_shape[own].along(axis, subdomains[own].shape[node]));
         }
-        add(&|level| level == above, &|own, node, axis| by_place[own].along(axis, subdomains[own].points[node]));
+        add(above..=above, &|own, node, axis| by_place[own].along(axis, subdomains[own].points[node]));
         Self { levels, of_rows, own: subdomains.len() }
     }
 
@@ -64,36 +63,14 @@ impl Gluing {
         forces
     }
 
-    /// `sums += G rows` for own subdomains with these modes, by the rows of some levels.
-    pub fn add_resultants(&self, modes: &[RigidModes], levels: RangeInclusive<usize>, rows: &[f64], sums: &mut [f64]) {
-        let forces = self.forces(levels, rows);
-        for ((sum, modes), force) in sums.as_chunks_mut::<MODES>().0.iter_mut().zip(modes).zip(forces) {
-            sum.iter_mut().zip(modes.of_force(force)).for_each(|(sum, x)| *sum += x);
-        }
-    }
-
     /// `rows += factor` times the jumps that motions make in the rows of some levels: translations, and rotations about the centres of
     /// subdomains, by place.
     pub fn add_jumps(&self, levels: RangeInclusive<usize>, factor: f64, motions: &[Six], rows: &mut [f64]) {
         self.levels[levels.start() - 1..*levels.end()].iter().for_each(|of| of.add_jumps(factor, motions, rows));
     }
-
-    /// `rows += factor G'a` in the rows of some levels, of six numbers an own subdomain with these modes. One neighbour exchange.
-    pub fn add_moved(
-        &self,
-        (halo, modes): (&Halo, &[RigidModes]),
-        levels: RangeInclusive<usize>,
-        factor: f64,
-        a: &[f64],
-        rows: &mut [f64],
-    ) {
-        let motions = a.as_chunks::<MODES>().0.iter().zip(modes);
-        let mut motions: Vec<f64> = motions.flat_map(|(a, modes)| modes.to_motion(*a)).collect();
-        halo.fill(&mut motions, MODES);
-        self.add_jumps(levels, factor, motions.as_chunks::<MODES>().0, rows);
-    }
 }
 
+/// The level of a row that always holds.
 fn level(clusters: &Clusters, constraints: &Constraints, row: usize) -> Option<usize> {
     let slots = &constraints.slot_subdomain[constraints.slots(row)];
     let is_within = |level: &usize| {
