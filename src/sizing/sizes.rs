@@ -7,7 +7,7 @@ use super::memory::{Held, Lengths, Memory, Numbers, PROCESS_MB};
 use crate::comm::exact::exact_sums;
 use crate::comm::{Comm, maximum};
 use crate::constraint::Kind;
-use crate::decomposition::{Cut, Decomposition};
+use crate::decomposition::{Cut, Decomposition, Subdomain, bricks};
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::factor::{Symbolic, analyse};
 use crate::model::discrete::{Discrete, cut};
@@ -56,15 +56,20 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
 /// Subdomains of equal connectivity are analysed once. Collective.
 pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
     let Discrete { decomposition, constraints, contacts, .. } = discrete;
-    let is_box = matches!(cut(&scene.decomposition.method, &discrete.bodies), Cut::Bricks(_));
+    let cut = cut(&scene.decomposition.method, &discrete.bodies);
+    let boxes = |s: &Subdomain| match cut {
+        Cut::Bricks(cells) => Some(bricks::count(&discrete.bodies[s.body], cells)),
+        Cut::Parts(_) => None,
+    };
     let lengths = |s: &Rc<Symbolic>| {
         let lengths = [s.analysis().factor_length(), s.pattern.rows.len(), s.pattern.dofs()];
         let [factor, matrix, unknowns] = lengths.map(|n| n as f64);
         Lengths { factor, matrix, unknowns }
     };
     let lengths: Vec<Lengths> = analyse(&decomposition.subdomains).iter().map(lengths).collect();
-    let of_subdomains = lengths.iter().map(|&lengths| Numbers::of_subdomain(scene, lengths, is_box));
-    let groups = if is_box { Vec::new() } else { members_of_groups(decomposition) };
+    let each = lengths.iter().zip(&decomposition.subdomains);
+    let of_subdomains = each.map(|(&lengths, subdomain)| Numbers::of_subdomain(scene, lengths, boxes(subdomain)));
+    let groups = if matches!(cut, Cut::Bricks(_)) { Vec::new() } else { members_of_groups(decomposition) };
     let groups = groups.into_iter().map(|members| Numbers::of_group(members as f64));
     // Each block counts once, where its lowest subdomain is.
     let blocks = constraints.blocks.iter().zip(&constraints.block_subdomains);

@@ -49,7 +49,7 @@ impl Parts {
         let (clusters, coarse_blocks) = (grouped(&groups[..groups.len().min(1)]), grouped(groups));
         let of_box: u64 = 3 * cells.iter().map(|&n| (body.kind.degree() * n + 1) as u64).product::<u64>();
         let unknowns = count * of_box;
-        let numbers = Numbers::of_subdomain(scene, lengths, true).times(count as f64);
+        let numbers = Numbers::of_subdomain(scene, lengths, Some(count as usize)).times(count as f64);
         let slots = SLOTS * (unknowns - 3 * body.counts().nodes) as f64;
         Self { count, clusters, coarse_blocks, touching, unknowns, slots, numbers, factor: lengths.factor }
     }
@@ -69,7 +69,7 @@ impl Parts {
         let glued = RAGGED * (product([0, 1, 2].map(|a| extent[a] + along[a] - 1.0)) - product(extent));
         let of_piece = (nodes + glued) / count;
         let lengths = local::of_nodes(body.kind, of_piece);
-        let (mut of_levels, mut numbers) = (vec![count], Numbers::of_subdomain(scene, lengths, false).times(count));
+        let (mut of_levels, mut numbers) = (vec![count], Numbers::of_subdomain(scene, lengths, None).times(count));
         for &size in groups {
             let count = (of_levels[of_levels.len() - 1] / size as f64).ceil();
             numbers += Numbers::of_group(size as f64).times(count);
