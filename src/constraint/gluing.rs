@@ -1,8 +1,9 @@
 //! Gluing rows: the copies of a node move together.
 //!
 //! Per component the rows are an orthonormal basis of the complement of the constant over the copies (Helmert's): row `k`
-//! compares copy `k` with the mean of those before it. Copies in one group are compared among themselves, and the mean of each
-//! group with that of the groups before it: only these rows move whole groups against each other. The stiffest come first.
+//! compares copy `k` with the mean of those before it. They come in threes, one along each axis with the same coefficients.
+//! Copies in one group are compared among themselves, and the mean of each group with that of the groups before it: only these
+//! rows move whole groups against each other. The stiffest come first.
 
 use super::{Kind, Row, Term};
 use crate::decomposition::{Clusters, InterfaceNode};
@@ -17,21 +18,21 @@ pub(super) fn rows(node: &InterfaceNode, clusters: &Clusters, stiffness: impl Fn
         copies.sort_by_key(|copy| stiffest.iter().position(|group| *group == of(copy)));
     }
     let mut rows = Vec::new();
-    (0..3).for_each(|axis| compare_within(clusters, clusters.levels(), (node.node, axis), &copies, &mut rows));
+    compare_within(clusters, clusters.levels(), node.node, &copies, &mut rows);
     rows
 }
 
 /// The rows of copies in one group of the level above `level`, of which those of one group of a level are side by side.
-fn compare_within(clusters: &Clusters, level: usize, at: (u64, usize), copies: &[u32], rows: &mut Vec<Row>) {
+fn compare_within(clusters: &Clusters, level: usize, node: u64, copies: &[u32], rows: &mut Vec<Row>) {
     let of = |copy: u32| clusters.group(level, copy as usize);
     let mut before = 0;
     for group in copies.chunk_by(|&a, &b| of(a) == of(b)) {
         let end = before + group.len();
         if before > 0 {
-            rows.push(compare(at, &copies[..before], &copies[before..end]));
+            rows.extend((0..3).map(|axis| compare((node, axis), &copies[..before], &copies[before..end])));
         }
         if level > 0 {
-            compare_within(clusters, level - 1, at, group, rows);
+            compare_within(clusters, level - 1, node, group, rows);
         }
         before = end;
     }
@@ -59,6 +60,11 @@ mod tests {
         for (clusters, leaving) in [(single, 15), (clusters, 6), (nested, 3)] {
             let rows = rows(&node, &clusters, |s| [1.0, 4.0, 1.0, 1.0, 1.0, 2.0, 8.0, 1.0, 1.0][s as usize]);
             assert_eq!(rows.len(), 15);
+            for three in rows.as_chunks::<3>().0 {
+                for (axis, row) in three.iter().enumerate() {
+                    assert!(row.terms.iter().copied().eq(three[0].terms.iter().map(|t| Term { axis, ..*t })));
+                }
+            }
             for (i, a) in rows.iter().enumerate() {
                 assert!(a.terms.iter().map(|t| t.value).sum::<f64>().abs() < 1e-15);
                 for (j, b) in rows.iter().enumerate() {

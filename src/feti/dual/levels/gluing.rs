@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use super::halo::Halo;
 use super::levers::{Levers, Six};
 use super::{Motions, Tree};
-use crate::constraint::{Constraints, Kind};
+use crate::constraint::{Constraints, Kind, Row};
 use crate::decomposition::{Clusters, Subdomain};
 use crate::feti::dual::gather::Gather;
 use crate::feti::inverse::kernel::{MODES, RigidModes};
@@ -38,7 +38,12 @@ impl Gluing {
             let is_of = |row: usize| of.contains(&of_rows[row]);
             gather.moved(is_of, of_dof, |row, values| {
                 let places = constraints.slots(row).map(|slot| halo.place(constraints.slot_subdomain[slot]));
-                levels[of_rows[row] as usize - 1].push(row, places.zip(values.iter().copied()));
+                let (slots, levers) = (places.zip(values.iter().copied()), &mut levels[of_rows[row] as usize - 1]);
+                let Row { kind, terms, .. } = &constraints.rows[row];
+                match kind {
+                    Kind::Gluing => levers.push_of_three(row, terms[0].axis, slots),
+                    _ => levers.push(row, slots),
+                }
             });
         };
         // Congruent members of groups have equal bits. Clusters are where they are, as loads and displacements are.

@@ -1,9 +1,12 @@
-//! Rows as forces on subdomains: along one component of the displacement a slot has three of six numbers, its force and its moments about
-//! the two other axes.
+//! Rows as forces on subdomains.
 //!
-//! A row that acts along several components is among the rows of each of them, with a part of its moments.
+//! The rows that glue a node come in threes, one along each axis, with the same slots. Multipliers `x` of three are a force `c x` on the
+//! subdomain of each slot, with the moment `l x x`: four numbers, the coefficient `c` and the lever `l`, which is `c` times the arm.
+//! Of any other row a slot has three of six numbers along one component of the displacement: its force, and its moments about the
+//! two other axes. A row that acts along several components is among the rows of each of them, with a part of its moments.
 
 use crate::feti::inverse::kernel::MODES;
+use crate::vector::cross;
 use crate::work;
 
 /// Six numbers of a force and its moment, or of a translation and a rotation.
@@ -11,7 +14,23 @@ pub type Six = [f64; MODES];
 
 /// Some rows of one rank.
 #[derive(Default)]
-pub struct Levers([AlongAxis; 3]);
+pub struct Levers {
+    threes: Threes,
+    along: [AlongAxis; 3],
+}
+
+/// Those in threes.
+#[derive(Default)]
+struct Threes {
+    /// The first of each three.
+    rows: Vec<u32>,
+    /// Last slot of each three, and one more.
+    ends: Vec<u32>,
+    /// For each slot the place of its subdomain ([`super::Halo::place`]).
+    places: Vec<u32>,
+    /// For each slot its coefficient and its lever.
+    levers: Vec<[f64; 4]>,
+}
 
 /// Those along one component.
 #[derive(Default)]
@@ -19,7 +38,7 @@ struct AlongAxis {
     rows: Vec<u32>,
     /// Last slot of each row, and one more.
     ends: Vec<u32>,
-    /// For each slot the place of its subdomain ([`super::Halo::place`]).
+    /// For each slot the place of its subdomain.
     places: Vec<u32>,
     /// The slot's force, and its moments about the two axes after its own.
     levers: Vec<[f64; 3]>,
@@ -31,6 +50,23 @@ const fn of_axis(axis: usize) -> [usize; 3] {
 }
 
 impl Levers {
+    /// Adds a row along an axis. After one along the first axis, those along the second and the third follow, with the next numbers, the
+    /// same slots and the same coefficients.
+    pub fn push_of_three(&mut self, row: usize, axis: usize, slots: impl ExactSizeIterator<Item = (u32, Six)>) {
+        let Threes { rows, ends, places, levers } = &mut self.threes;
+        if axis == 0 {
+            for (place, [coefficient, _, _, _, about_second, about_third]) in slots {
+                places.push(place);
+                levers.push([coefficient, 0.0, -about_third, about_second]);
+            }
+            rows.push(row as u32);
+            ends.push(places.len() as u32);
+        } else if axis == 1 {
+            let begin = levers.len() - slots.len();
+            levers[begin..].iter_mut().zip(slots).for_each(|(lever, (_, force))| lever[1] = force[5]);
+        }
+    }
+
     /// Adds a row, with the place and the force of each of its slots.
     pub fn push(&mut self, row: usize, slots: impl Iterator<Item = (u32, Six)> + Clone) {
         let mut left: Vec<Six> = slots.clone().map(|(_, force)| force).collect();
@@ -42,7 +78,7 @@ impl Levers {
                 if !left.iter().any(|force| told.iter().any(|&k| force[k] != 0.0)) {
                     continue;
                 }
-                let of = &mut self.0[axis];
+                let of = &mut self.along[axis];
                 of.rows.push(row as u32);
                 of.places.extend(slots.clone().map(|(place, _)| place));
                 of.levers.extend(left.iter_mut().map(|force| entries.map(|k| std::mem::take(&mut force[k]))));
@@ -53,16 +89,61 @@ impl Levers {
 
     /// `forces += ` what the rows `x` exert on own subdomains, which have the first places.
     pub fn add_forces(&self, x: &[f64], forces: &mut [Six]) {
-        self.0[0].add_forces::<0>(x, forces);
-        self.0[1].add_forces::<1>(x, forces);
-        self.0[2].add_forces::<2>(x, forces);
+        self.threes.add_forces(x, forces);
+        self.along[0].add_forces::<0>(x, forces);
+        self.along[1].add_forces::<1>(x, forces);
+        self.along[2].add_forces::<2>(x, forces);
     }
 
     /// `rows += factor` times the jumps that these motions make, given by place.
     pub fn add_jumps(&self, factor: f64, motions: &[Six], rows: &mut [f64]) {
-        self.0[0].add_jumps::<0>(factor, motions, rows);
-        self.0[1].add_jumps::<1>(factor, motions, rows);
-        self.0[2].add_jumps::<2>(factor, motions, rows);
+        self.threes.add_jumps(factor, motions, rows);
+        self.along[0].add_jumps::<0>(factor, motions, rows);
+        self.along[1].add_jumps::<1>(factor, motions, rows);
+        self.along[2].add_jumps::<2>(factor, motions, rows);
+    }
+}
+
+impl Threes {
+    /// Operations at a slot: a product with a number, a cross product, and a sum of six.
+    const OF_SLOT: usize = 18;
+
+    /// The first row of each three, with its slots.
+    fn rows(&self) -> impl Iterator<Item = (usize, &[u32], &[[f64; 4]])> {
+        work::each(self.levers.len(), Self::OF_SLOT, size_of::<[f64; 4]>() + size_of::<u32>());
+        let mut begin = 0;
+        self.rows.iter().zip(&self.ends).map(move |(&row, &end)| {
+            let slots = begin..end as usize;
+            begin = slots.end;
+            (row as usize, &self.places[slots.clone()], &self.levers[slots])
+        })
+    }
+
+    fn add_forces(&self, x: &[f64], forces: &mut [Six]) {
+        for (row, places, levers) in self.rows() {
+            let x = [x[row], x[row + 1], x[row + 2]];
+            for (&place, &[coefficient, lever @ ..]) in places.iter().zip(levers) {
+                if let Some(sum) = forces.get_mut(place as usize) {
+                    let moment = cross(lever, x);
+                    for k in 0..3 {
+                        sum[k] += coefficient * x[k];
+                        sum[3 + k] += moment[k];
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_jumps(&self, factor: f64, motions: &[Six], rows: &mut [f64]) {
+        for (row, places, levers) in self.rows() {
+            let mut jump = [0.0; 3];
+            for (&place, &[coefficient, lever @ ..]) in places.iter().zip(levers) {
+                let [x, y, z, rotation @ ..] = motions[place as usize];
+                let turned = cross(rotation, lever);
+                jump.iter_mut().zip([x, y, z]).zip(turned).for_each(|((sum, t), r)| *sum += coefficient * t + r);
+            }
+            rows[row..row + 3].iter_mut().zip(jump).for_each(|(row, jump)| *row += factor * jump);
+        }
     }
 }
 
@@ -110,7 +191,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Rows along one axis, along several, and couples; some slots are of other ranks.
+    /// Rows along one axis, along several, and couples, and such in threes; some slots are of other ranks.
     #[test]
     fn sums_are_those_of_all_six_numbers() {
         let mut random = Random::new(5);
@@ -124,12 +205,30 @@ mod tests {
         ];
         let (own, all) = (3, 5);
         let mut six = |mask: [usize; MODES]| mask.map(|m| m as f64 * random.number());
-        let rows: Vec<Vec<(u32, Six)>> = (0..24)
+        let mut rows: Vec<Vec<(u32, Six)>> = (0..24)
             .map(|row| (0..2 + row % 3).map(|slot| (((row + slot) % all) as u32, six(masks[row % 6]))).collect())
             .collect();
         let motions: Vec<Six> = (0..all).map(|_| six([1; MODES])).collect();
         let mut levers = Levers::default();
         rows.iter().enumerate().for_each(|(row, slots)| levers.push(row, slots.iter().copied()));
+        // Threes, each with a coefficient and an arm for each of its slots.
+        let mut three = |first: usize| {
+            let [c, x, y, z] = [(); 4].map(|()| random.number());
+            let forces = [
+                [c, 0.0, 0.0, 0.0, c * z, -c * y],
+                [0.0, c, 0.0, -c * z, 0.0, c * x],
+                [0.0, 0.0, c, c * y, -c * x, 0.0],
+            ];
+            forces.map(|force| ((first % all) as u32, force))
+        };
+        for first in [24, 27, 30, 33] {
+            let slots: Vec<_> = (0..2 + first % 2).map(|slot| three(first + slot)).collect();
+            for axis in 0..3 {
+                let of_axis: Vec<(u32, Six)> = slots.iter().map(|of_slot| of_slot[axis]).collect();
+                levers.push_of_three(first + axis, axis, of_axis.iter().copied());
+                rows.push(of_axis);
+            }
+        }
 
         let x: Vec<f64> = (0..rows.len()).map(|row| 1.0 + row as f64).collect();
         let mut forces = vec![[1.0; MODES]; own];
