@@ -409,7 +409,7 @@ def of_runs(runs, held, units):
     yield (
         "With the cascade; seconds without messages. *By counts*: bytes, flops and unknowns of each phase, as the program counts them, "
         "times seconds of each. *By the scene*: amounts that `check` tells beforehand, with the run's own steps and applications; it "
-        "cannot know how much yields, so how many congruent subdomains share a factor.\n"
+        "cannot know how much yields, and takes it that congruent subdomains share factors as those of the benchmark do.\n"
     )
     rows, errors = [], []
     for run in [*runs, *held]:

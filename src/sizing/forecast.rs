@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `meshes` | unknowns: reading, cutting, analysis, results; for each step assembly, forces and residuals |
 //! | `rows` | slots of rows: set-up; for each application `B`, `B'`, `G` of groups, inner products |
-//! | `factors` | operations of the factors; for each application the numbers in them |
+//! | `factors` | operations of the factors that subdomains do not share; for each application the numbers in them |
 //! | `coarse` | operations of the factor of the highest level, which every rank makes; numbers that a rank solves with |
 //! | `exchanges`, `messages` | exchanges with several ranks at once, one after the other; messages of all of them |
 //! | `collectives`, `bytes` | steps of trees of all ranks; bytes sent or received |
@@ -133,8 +133,7 @@ fn amounts(sizes: &Sizes, memory: &Memory, ranks: f64, part: f64) -> Vec<Amount>
     // Subdomains are whole.
     let share = (subdomains / ranks).ceil().max(1.0) / sizes.subdomains as f64;
     let [unknowns, rows] = [sizes.primal_dofs, sizes.dual_dofs].map(|n| n as f64);
-    let numbers = memory.numbers.factors();
-    let operations = (numbers / sizes.subdomains as f64).powf(1.5) * sizes.subdomains as f64;
+    let [numbers, operations] = memory.numbers.factors();
     let blocks = (part * sizes.coarse_blocks as f64).max(1.0);
     let levels = if sizes.clusters == sizes.subdomains { 0.0 } else { groups(sizes) };
     let length = super::memory::of_coarse(blocks);

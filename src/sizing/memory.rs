@@ -75,8 +75,6 @@ const OF_RANK: [f64; 2] = [64.0, 500.0];
 const YIELDING: [f64; 2] = [0.19, 1.17];
 /// ... where none may: a few shapes.
 const ELASTIC: f64 = 0.125;
-/// Part that the [`forecast`](super::forecast) counts, if a material may yield, and if none may: its units were fitted with it.
-const COUNTED: [f64; 2] = [0.5, ELASTIC];
 /// Numbers for each unknown, if a material may yield, and if none may.
 const VECTORS: [f64; 2] = [110.0, 45.0];
 /// Numbers for each unknown among these that are the mesh: places twice, numbers of nodes, elements by their nodes.
@@ -98,7 +96,7 @@ pub(super) struct Lengths {
 }
 
 /// Numbers that subdomains take: their mesh, factors, matrices, vectors (with tangents, histories and results), bonds of
-/// groups, and slots of their rows; last the factors as the forecast counts them.
+/// groups, and slots of their rows; last the operations that make the factors, for the [`forecast`](super::forecast).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Numbers(pub [f64; 7]);
 
@@ -106,13 +104,12 @@ impl Numbers {
     /// Of a subdomain, which may be one of so many congruent boxes of its body.
     pub fn of_subdomain(scene: &Scene, Lengths { factor, matrix, unknowns }: Lengths, boxes: Option<usize>) -> Self {
         let yields = scene.material.values().any(Law::yields);
-        let of_boxes = |boxes: usize| (distinct(boxes as f64, yields), COUNTED[usize::from(!yields)], 1.5);
-        let (held, counted, index) = boxes.map_or((1.0, 1.0, 2.8), of_boxes);
+        let (held, index) = boxes.map_or((1.0, 2.8), |boxes| (distinct(boxes as f64, yields), 1.5));
         let precision = if scene.solver.precision == Precision::Mixed { 0.5 } else { 1.0 };
         let whole = if unknowns > IN_DOUBLE { 1.0 } else { precision };
         let interior = if scene.solver.preconditioner == Preconditioner::Dirichlet { 0.5 * precision } else { 0.0 };
         let (factor, vectors) = ((whole + interior) * factor, (VECTORS[usize::from(!yields)] - MESH) * unknowns);
-        Self([MESH * unknowns, held * factor, index * matrix, vectors, 0.0, 0.0, counted * factor])
+        Self([MESH * unknowns, held * factor, index * matrix, vectors, 0.0, 0.0, held * factor.powf(1.5)])
     }
 
     /// Of the inverse of a group of so many members, where no other group is like it.
@@ -120,9 +117,10 @@ impl Numbers {
         Self([0.0, 0.0, 0.0, 0.0, (6.0 * (members - 1.0)).powi(2), 0.0, 0.0])
     }
 
-    /// Those in factors, as the forecast counts them.
-    pub fn factors(&self) -> f64 {
-        self.0[6]
+    /// Those in factors that subdomains do not share, and the operations that make these: a factor of `n` numbers takes `n^1.5` by
+    /// nested dissection in space (George 1973).
+    pub fn factors(&self) -> [f64; 2] {
+        [self.0[1], self.0[6]]
     }
 
     /// Of slots of rows.
