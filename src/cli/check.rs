@@ -79,7 +79,7 @@ pub fn check(arguments: &Check, comm: &dyn Comm) -> Result<i32, Failure> {
     // A level has as many cells along an edge.
     let levels = Cascade::Auto.before(source.level, &scene).into_iter().chain([source.level]);
     let parts: Vec<f64> = levels.map(|level| (level as f64 / source.level as f64).powi(3)).collect();
-    let forecast = arguments.ranks.map(|ranks| forecast(&sizes, &memory, ranks, &parts));
+    let forecast = arguments.ranks.map(|ranks| forecast((&sizes, scene.body.len()), &memory, ranks, &parts));
     forecast.iter().for_each(|forecast| monitor.event(&Event::Forecast(forecast.clone())));
     warnings.iter().for_each(|text| monitor.event(&Event::Warning(text.clone())));
     if let Some(file) = &source.summary {

@@ -96,9 +96,10 @@ pub(super) struct Lengths {
 }
 
 /// Numbers that subdomains take: their mesh, factors, matrices, vectors (with tangents, histories and results), bonds of
-/// groups, and slots of their rows; last the operations that make the factors, for the [`forecast`](super::forecast).
+/// groups, and slots of their rows; last, for the [`forecast`](super::forecast), those in factors of all subdomains if none were
+/// shared, and the operations that make these.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Numbers(pub [f64; 7]);
+pub(super) struct Numbers(pub [f64; 8]);
 
 impl Numbers {
     /// Of a subdomain, which may be one of so many congruent boxes of its body.
@@ -109,23 +110,26 @@ impl Numbers {
         let whole = if unknowns > IN_DOUBLE { 1.0 } else { precision };
         let interior = if scene.solver.preconditioner == Preconditioner::Dirichlet { 0.5 * precision } else { 0.0 };
         let (factor, vectors) = ((whole + interior) * factor, (VECTORS[usize::from(!yields)] - MESH) * unknowns);
-        Self([MESH * unknowns, held * factor, index * matrix, vectors, 0.0, 0.0, held * factor.powf(1.5)])
+        Self([MESH * unknowns, held * factor, index * matrix, vectors, 0.0, 0.0, factor, factor.powf(1.5)])
     }
 
     /// Of the inverse of a group of so many members, where no other group is like it.
     pub fn of_group(members: f64) -> Self {
-        Self([0.0, 0.0, 0.0, 0.0, (6.0 * (members - 1.0)).powi(2), 0.0, 0.0])
+        Self([0.0, 0.0, 0.0, 0.0, (6.0 * (members - 1.0)).powi(2), 0.0, 0.0, 0.0])
     }
 
-    /// Those in factors that subdomains do not share, and the operations that make these: a factor of `n` numbers takes `n^1.5` by
-    /// nested dissection in space (George 1973).
-    pub fn factors(&self) -> [f64; 2] {
-        [self.0[1], self.0[6]]
+    /// Those in factors, and the operations that make these: a factor of `n` numbers takes `n^1.5` by nested dissection in space (George
+    /// 1973). Boxes share the factors of their own rank: where a rank has a body's boxes by so many times fewer, more are on a border.
+    pub fn factors(&self, fewer: f64) -> [f64; 2] {
+        let [_, held, .., all, operations] = self.0;
+        let part = held / all;
+        let part = (part.min(YIELDING[0]) + (part - YIELDING[0]).max(0.0) * fewer.cbrt()).min(1.0);
+        [part * all, part * operations]
     }
 
     /// Of slots of rows.
     pub fn of_slots(slots: f64) -> Self {
-        Self([0.0, 0.0, 0.0, 0.0, 0.0, SLOT * slots, 0.0])
+        Self([0.0, 0.0, 0.0, 0.0, 0.0, SLOT * slots, 0.0, 0.0])
     }
 
     /// Of so many like these.
@@ -158,7 +162,7 @@ pub(super) struct Held {
 impl Held {
     /// The items; the largest factor in its subdomains is worked on in double precision, beside the interior's.
     pub fn items(&self) -> Vec<Item> {
-        let [meshes, factors, matrices, vectors, bonds, slots, _] = self.numbers.0.map(|numbers| 8.0 * numbers);
+        let [meshes, factors, matrices, vectors, bonds, slots, ..] = self.numbers.0.map(|numbers| 8.0 * numbers);
         let [single, coupled] = self.conditions;
         vec![
             Item::owned("meshes", meshes),
@@ -210,5 +214,17 @@ mod tests {
         }
         assert_eq!(distinct(1.0, false), 1.0);
         assert_eq!(distinct(1e6, false), ELASTIC);
+    }
+
+    /// On a thousandth of a body's boxes as on a body with a thousandth of them; parts without a twin and elastic boxes as anywhere.
+    #[test]
+    fn boxes_of_other_ranks_share_nothing() {
+        let of = |part: f64| Numbers([0.0, part * 10.0, 0.0, 0.0, 0.0, 0.0, 10.0, 30.0]);
+        for (held, few) in [(distinct(1e6, true), distinct(1e3, true)), (1.0, 1.0), (ELASTIC, ELASTIC)] {
+            let ([numbers, operations], [whole, _]) = (of(held).factors(1000.0), of(held).factors(1.0));
+            assert!((numbers / (few * 10.0) - 1.0).abs() < 1e-12 && (operations / (few * 30.0) - 1.0).abs() < 1e-12);
+            assert!((whole / (held * 10.0) - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(of(0.5).factors(1e9), [10.0, 30.0]);
     }
 }
