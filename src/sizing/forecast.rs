@@ -181,24 +181,33 @@ mod tests {
     use crate::fixture::two_bricks;
     use crate::sizing::counts::Counted;
 
-    fn of(ranks: usize, parts: &[f64]) -> Forecast {
+    /// Two bodies.
+    fn blocks() -> (Sizes, Memory) {
         let boxes = ["body.lower.brick.cells=[32, 16, 16]", "body.upper.brick.cells=[32, 16, 16]"];
         let scene =
             two_bricks(&[&boxes[..], &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=[8, 8]"]].concat());
         let counted = Counted::new(&scene).expect("bodies are bricks");
-        forecast((&counted.sizes(), 2), &counted.memory(), ranks, parts)
+        (counted.sizes(), counted.memory())
+    }
+
+    fn of(ranks: usize, parts: &[f64]) -> Forecast {
+        let (sizes, memory) = blocks();
+        forecast((&sizes, 2), &memory, ranks, parts)
     }
 
     #[test]
     fn every_amount_has_a_unit_and_shares_shrink_with_the_ranks() {
         let [few, many] = [16, 64].map(|ranks| of(ranks, &[1.0]).levels[0].clone());
+        // A smaller share has fewer factors in common.
+        let [in_few, in_many] = [8.0, 32.0].map(|fewer| blocks().1.numbers.factors(fewer)[0]);
+        assert!(in_few <= in_many);
+        let in_proportion = |a: &Amount, b: &Amount, ratio: f64| (a.amount / b.amount - ratio).abs() < 1e-12;
         for (a, b) in few.amounts.iter().zip(&many.amounts) {
             assert!(MODEL.sizes.iter().all(|size| size.units.iter().any(|unit| unit.of == a.of && unit.per == a.per)));
             assert_eq!((a.of, a.per), (b.of, b.per));
             match a.of {
-                // A smaller share has fewer alike.
-                "factors" => assert!(a.amount / b.amount < 4.0 + 1e-12 && a.amount / b.amount > 2.0),
-                "meshes" | "rows" => assert!((a.amount / b.amount - 4.0).abs() < 1e-12, "{}", a.of),
+                "factors" => assert!(in_proportion(a, b, 4.0 * in_few / in_many)),
+                "meshes" | "rows" => assert!(in_proportion(a, b, 4.0), "{}", a.of),
                 "coarse" if a.per == Per::Run => assert_eq!(a.amount, b.amount),
                 "coarse" => assert!(b.amount < a.amount && a.amount < 4.0 * b.amount),
                 "collectives" => assert!((b.amount / a.amount - 1.5).abs() < 1e-12),

@@ -15,33 +15,21 @@ pub type Six = [f64; MODES];
 /// Some rows of one rank.
 #[derive(Default)]
 pub struct Levers {
-    threes: Threes,
-    along: [AlongAxis; 3],
+    /// Those in threes, by the first of each: for each slot its coefficient and its lever.
+    threes: Slots<4>,
+    /// Those along one component: for each slot its force, and its moments about the two axes after its own.
+    along: [Slots<3>; 3],
 }
 
-/// Those in threes.
+/// Rows with so many numbers for each of their slots.
 #[derive(Default)]
-struct Threes {
-    /// The first of each three.
-    rows: Vec<u32>,
-    /// Last slot of each three, and one more.
-    ends: Vec<u32>,
-    /// For each slot the place of its subdomain ([`super::Halo::place`]).
-    places: Vec<u32>,
-    /// For each slot its coefficient and its lever.
-    levers: Vec<[f64; 4]>,
-}
-
-/// Those along one component.
-#[derive(Default)]
-struct AlongAxis {
+struct Slots<const N: usize> {
     rows: Vec<u32>,
     /// Last slot of each row, and one more.
     ends: Vec<u32>,
-    /// For each slot the place of its subdomain.
+    /// For each slot the place of its subdomain ([`super::Halo::place`]).
     places: Vec<u32>,
-    /// The slot's force, and its moments about the two axes after its own.
-    levers: Vec<[f64; 3]>,
+    levers: Vec<[f64; N]>,
 }
 
 /// Which of the six numbers of a force along an axis are not zero.
@@ -53,15 +41,11 @@ impl Levers {
     /// Adds a row along an axis. After one along the first axis, those along the second and the third follow, with the next numbers, the
     /// same slots and the same coefficients.
     pub fn push_of_three(&mut self, row: usize, axis: usize, slots: impl ExactSizeIterator<Item = (u32, Six)>) {
-        let Threes { rows, ends, places, levers } = &mut self.threes;
         if axis == 0 {
-            for (place, [coefficient, _, _, _, about_second, about_third]) in slots {
-                places.push(place);
-                levers.push([coefficient, 0.0, -about_third, about_second]);
-            }
-            rows.push(row as u32);
-            ends.push(places.len() as u32);
+            let lever = |(place, [force, _, _, _, second, third]): (u32, Six)| (place, [force, 0.0, -third, second]);
+            self.threes.push(row, slots.map(lever));
         } else if axis == 1 {
+            let levers = &mut self.threes.levers;
             let begin = levers.len() - slots.len();
             levers[begin..].iter_mut().zip(slots).for_each(|(lever, (_, force))| lever[1] = force[5]);
         }
@@ -78,11 +62,8 @@ impl Levers {
                 if !left.iter().any(|force| told.iter().any(|&k| force[k] != 0.0)) {
                     continue;
                 }
-                let of = &mut self.along[axis];
-                of.rows.push(row as u32);
-                of.places.extend(slots.clone().map(|(place, _)| place));
-                of.levers.extend(left.iter_mut().map(|force| entries.map(|k| std::mem::take(&mut force[k]))));
-                of.ends.push(of.places.len() as u32);
+                let levers = left.iter_mut().map(|force| entries.map(|k| std::mem::take(&mut force[k])));
+                self.along[axis].push(row, slots.clone().map(|(place, _)| place).zip(levers));
             }
         }
     }
@@ -104,13 +85,19 @@ impl Levers {
     }
 }
 
-impl Threes {
-    /// Operations at a slot: a product with a number, a cross product, and a sum of six.
-    const OF_SLOT: usize = 18;
+impl<const N: usize> Slots<N> {
+    fn push(&mut self, row: usize, slots: impl Iterator<Item = (u32, [f64; N])>) {
+        for (place, lever) in slots {
+            self.places.push(place);
+            self.levers.push(lever);
+        }
+        self.rows.push(row as u32);
+        self.ends.push(self.places.len() as u32);
+    }
 
-    /// The first row of each three, with its slots.
-    fn rows(&self) -> impl Iterator<Item = (usize, &[u32], &[[f64; 4]])> {
-        work::each(self.levers.len(), Self::OF_SLOT, size_of::<[f64; 4]>() + size_of::<u32>());
+    /// The rows with their slots, to do so many operations at each of these.
+    fn each(&self, flops: usize) -> impl Iterator<Item = (usize, &[u32], &[[f64; N]])> {
+        work::each(self.levers.len(), flops, size_of::<[f64; N]>() + size_of::<u32>());
         let mut begin = 0;
         self.rows.iter().zip(&self.ends).map(move |(&row, &end)| {
             let slots = begin..end as usize;
@@ -118,9 +105,14 @@ impl Threes {
             (row as usize, &self.places[slots.clone()], &self.levers[slots])
         })
     }
+}
+
+impl Slots<4> {
+    /// Operations at a slot: a product with a number, a cross product, and a sum of six.
+    const FLOPS: usize = 18;
 
     fn add_forces(&self, x: &[f64], forces: &mut [Six]) {
-        for (row, places, levers) in self.rows() {
+        for (row, places, levers) in self.each(Self::FLOPS) {
             let x = [x[row], x[row + 1], x[row + 2]];
             for (&place, &[coefficient, lever @ ..]) in places.iter().zip(levers) {
                 if let Some(sum) = forces.get_mut(place as usize) {
@@ -135,7 +127,7 @@ impl Threes {
     }
 
     fn add_jumps(&self, factor: f64, motions: &[Six], rows: &mut [f64]) {
-        for (row, places, levers) in self.rows() {
+        for (row, places, levers) in self.each(Self::FLOPS) {
             let mut jump = [0.0; 3];
             for (&place, &[coefficient, lever @ ..]) in places.iter().zip(levers) {
                 let [x, y, z, rotation @ ..] = motions[place as usize];
@@ -147,21 +139,13 @@ impl Threes {
     }
 }
 
-impl AlongAxis {
-    /// The rows with their slots.
-    fn rows(&self) -> impl Iterator<Item = (usize, &[u32], &[[f64; 3]])> {
-        work::each(self.levers.len(), 6, size_of::<[f64; 3]>() + size_of::<u32>());
-        let mut begin = 0;
-        self.rows.iter().zip(&self.ends).map(move |(&row, &end)| {
-            let slots = begin..end as usize;
-            begin = slots.end;
-            (row as usize, &self.places[slots.clone()], &self.levers[slots])
-        })
-    }
+impl Slots<3> {
+    /// Operations at a slot: three products, and a sum of them.
+    const FLOPS: usize = 6;
 
     fn add_forces<const AXIS: usize>(&self, x: &[f64], forces: &mut [Six]) {
         let [force, first, second] = const { of_axis(AXIS) };
-        for (row, places, levers) in self.rows() {
+        for (row, places, levers) in self.each(Self::FLOPS) {
             let x = x[row];
             for (&place, lever) in places.iter().zip(levers) {
                 if let Some(sum) = forces.get_mut(place as usize) {
@@ -175,7 +159,7 @@ impl AlongAxis {
 
     fn add_jumps<const AXIS: usize>(&self, factor: f64, motions: &[Six], rows: &mut [f64]) {
         let [way, first, second] = const { of_axis(AXIS) };
-        for (row, places, levers) in self.rows() {
+        for (row, places, levers) in self.each(Self::FLOPS) {
             let mut jump = 0.0;
             for (&place, lever) in places.iter().zip(levers) {
                 let motion = &motions[place as usize];
