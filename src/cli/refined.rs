@@ -44,7 +44,7 @@ impl Run<'_> {
     ) -> Result<(Discrete, Solved), Failure> {
         let start = start(scene, |name| is_chosen(&plan.source, name)).map_err(Failure::Scene)?;
         start.notes.iter().for_each(|note| monitor.event(&Event::Note(note.clone())));
-        let (mut adaptive, mut meshes) = self.first_meshes(&start, &checkpoint, plan.refinements.len())?;
+        let (mut adaptive, mut meshes) = self.first_meshes(&start, &checkpoint, plan.refinements.len(), monitor)?;
         let (scene, goal) = (&start.scene, start.scene.solver.error.unwrap_or_default());
         let mut before = None;
         loop {
@@ -100,9 +100,11 @@ impl Run<'_> {
         Start { scene, read, .. }: &Start,
         checkpoint: &Option<Checkpoint>,
         refinements: usize,
+        monitor: &mut Monitor,
     ) -> Result<(Adaptive, Meshes), Failure> {
         let made = self.timer.time("discretisation", || Adaptive::new(scene, read, self.comm));
         let mut adaptive = made.map_err(ModelError::from)?;
+        adaptive.notes.iter().for_each(|note| monitor.event(&Event::Note(note.clone())));
         if let Some(file) = checkpoint {
             let unreadable = |reason| unfit(Unfit::Unreadable(reason));
             adaptive.repeat(self.comm, file, refinements).map_err(unreadable)?;

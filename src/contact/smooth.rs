@@ -5,11 +5,8 @@
 //! it. Faces around a node belong to one part if their normals there differ by at most [`SHARPEST`], or if a chain of such faces
 //! leads from one to the other. Curved surfaces in facets stay whole, edges of parts and chamfers of 45 degrees do not.
 
-use crate::mesh::surface::{area_vector, quadratic_normal};
+use crate::mesh::surface::{SHARPEST, area_vector, quadratic_normal};
 use crate::vector::dot;
-
-/// Angle between faces from which they meet at an edge, in degrees: that of most mesh generators.
-pub const SHARPEST: f64 = 40.0;
 
 /// Slack of the cosine of that angle, so that rounding does not cut a circle of nine facets.
 const ROUNDING: f64 = 1e-9;

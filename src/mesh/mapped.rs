@@ -15,13 +15,14 @@ use std::f64::consts::FRAC_PI_2;
 use std::f64::consts::FRAC_PI_4;
 
 use super::brick::HEXAHEDRON;
+use super::faces::key;
+use super::form::{Form, Forms};
 use super::portion::Portion;
 use super::solid::{Counts, NamedSurface};
 use super::{SolidMesh, split};
 use crate::comm::Comm;
 use crate::comm::words::share;
 use crate::element::{Cell, Kind};
-use crate::vector::length;
 
 /// A body.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,18 +91,22 @@ impl Mapped {
         SolidMesh { pieces: vec![0; portion.len()], portion, surfaces, piece_count: 1, counts }
     }
 
-    /// Where the middle of an edge between two nodes belongs: on the sphere or cylinder that both ends are on.
-    pub fn on_surface(&self, ends: [[f64; 3]; 2], middle: [f64; 3]) -> [f64; 3] {
-        let (radii, axes) = match self {
-            Self::Sphere { radii, .. } => (radii, 3),
-            Self::Cylinder { radii, .. } => (radii, 2),
-            Self::Grid { .. } => return middle,
+    /// The sphere or cylinder that each of its curved surfaces is on, with own faces (corners, ascending). Collective.
+    pub fn forms(&self, comm: &dyn Comm, mesh: &SolidMesh) -> Forms {
+        let (point, axis) = ([0.0; 3], [0.0, 0.0, 1.0]);
+        let all = match *self {
+            Self::Sphere { radii, .. } => radii.map(|radius| Form::Sphere { centre: point, radius }).to_vec(),
+            Self::Cylinder { radii, .. } => {
+                radii.map(|radius| Form::Cone { point, axis, radius, opening: 0.0 }).to_vec()
+            }
+            Self::Grid { .. } => Vec::new(),
         };
-        let distance = |x: &[f64; 3]| length(&x[..axes]);
-        let is_on = |radius: &&f64| ends.iter().all(|end| (distance(end) - **radius).abs() < ON_SURFACE * **radius);
-        let Some(radius) = radii.iter().find(is_on) else { return middle };
-        let factor = radius / distance(&middle);
-        std::array::from_fn(|a| if a < axes { factor * middle[a] } else { middle[a] })
+        let of_surface = |(form, name): (u32, &str)| {
+            mesh.surface(name).iter().map(|face| (key(&face[..3]), form)).collect::<Vec<_>>()
+        };
+        let faces =
+            if all.is_empty() { Vec::new() } else { (0..).zip(["inner", "outer"]).flat_map(of_surface).collect() };
+        Forms::new(comm, &mesh.portion.nodes, all, faces.into_iter().collect())
     }
 
     /// A cell by its number, x fastest, block after block.
@@ -269,9 +274,6 @@ impl Mapped {
         }
     }
 }
-
-/// A node is on a surface if it is as near, relative to the radius.
-const ON_SURFACE: f64 = 1e-9;
 
 /// Radius at a share of the wall.
 fn between([inner, outer]: &[f64; 2], share: f64) -> f64 {

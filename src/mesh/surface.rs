@@ -6,6 +6,10 @@
 //! face into triangles.
 
 use crate::vector::length;
+
+/// Angle between faces from which they meet at an edge, in degrees: that of most mesh generators.
+pub const SHARPEST: f64 = 40.0;
+
 /// Half the cross product of two edges: area times unit normal.
 pub fn area_vector(corners: &[[f64; 3]; 3]) -> [f64; 3] {
     let [a, b]: [[f64; 3]; 2] = [1, 2].map(|n| std::array::from_fn(|i| corners[n][i] - corners[0][i]));

@@ -99,6 +99,16 @@ impl Cell {
         kind.faces().iter().map(face).filter(|(_, set)| *set > 0)
     }
 
+    /// The faces at the refinement edge: the corner opposite to it, and the set of surfaces.
+    pub fn faces_across(&self) -> [(u32, u32); 2] {
+        [(self.nodes[2], self.on[3]), (self.nodes[3], self.on[2])]
+    }
+
+    /// Takes the forms from its faces; `without_form` tells the set of surfaces of a face that leaves its form.
+    pub fn flatten(&mut self, without_form: impl Fn(u32) -> u32) {
+        self.on = self.on.map(without_form);
+    }
+
     /// What is at the nodes that bisection makes, in the middle of which edges.
     pub fn new_nodes(&self, kind: Kind, nodes: &HashMap<u32, AtNode>) -> Vec<(Edge, AtNode)> {
         let [p, q, ..] = self.nodes;

@@ -6,11 +6,12 @@
 //! ranks tell each other which edges on their borders are bisected.
 //!
 //! A `cell` inherits region, piece and surfaces. Straight elements are split exactly; so are curved ones of second order, whose
-//! halves are the same quadratic patch. On spheres and cylinders of a [`Mapped`] body new nodes are put on the surface. Every node
-//! carries a displacement, which is passed on as shape functions interpolate it: exactly, where nodes are not moved.
+//! halves are the same quadratic patch. On spheres and cylinders of the body new nodes are put on the surface ([`Forms`], `round`).
+//! Every node carries a displacement, which is passed on as shape functions interpolate it: exactly, where nodes are not moved.
 
 mod cell;
 mod register;
+mod round;
 mod tagged;
 #[cfg(test)]
 mod tests;
@@ -19,12 +20,14 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use self::cell::{Cell, Edge};
 use self::register::Register;
+pub use self::round::Round;
 use super::curve::{self, on_grid};
 use super::faces::key;
+use super::form::Forms;
 use super::marked::forward;
 use super::solid::{Counts, NamedSurface};
 use super::wholes::Wholes;
-use super::{Mapped, Portion, SolidMesh};
+use super::{Portion, SolidMesh};
 use crate::comm::common::common;
 use crate::comm::words::sum;
 use crate::comm::{Comm, of_ranks};
@@ -44,19 +47,20 @@ pub struct Refinable {
     counts: Counts,
     piece_count: usize,
     surfaces: Vec<String>,
-    /// Sets of surfaces that a face may be on, the empty one first.
+    /// Sets of surfaces that a face may be on, the empty one first. Numbers behind those of the surfaces are curved forms.
     sets: Vec<Vec<u64>>,
-    /// The form of the body, if it is known.
-    form: Option<Mapped>,
+    /// For each set the one without its form.
+    without_form: Vec<u32>,
+    round: Round,
 }
 
 impl Refinable {
-    /// Of a mesh of tetrahedra that nothing was displaced of yet, as elements of a kind: linear ones become straight quadratic ones
-    /// where these are wanted. Collective.
+    /// Of a mesh of tetrahedra that nothing was displaced of yet, as elements of a kind: linear ones become quadratic ones where these
+    /// are wanted, straight but for edges on the forms of the body. Collective.
     ///
     /// # Panics
     /// If it has other elements.
-    pub fn new(comm: &dyn Comm, mesh: &SolidMesh, form: Option<Mapped>, kind: Kind) -> Self {
+    pub fn new(comm: &dyn Comm, mesh: &SolidMesh, forms: Forms, kind: Kind) -> Self {
         let portion = &mesh.portion;
         let mut on: HashMap<Vec<u32>, Vec<u64>> = HashMap::new();
         for (k, surface) in (0..).zip(&mesh.surfaces) {
@@ -64,7 +68,13 @@ impl Refinable {
                 on.entry(key(&face[..3])).or_default().push(k);
             }
         }
-        let mut sets: BTreeSet<Vec<u64>> = on.values().cloned().chain([Vec::new()]).collect();
+        let first_form = mesh.surfaces.len() as u64;
+        for (face, &form) in forms.faces.iter().filter(|(_, form)| forms.all[**form as usize].is_curved()) {
+            on.entry(face.clone()).or_default().push(first_form + u64::from(form));
+        }
+        let surfaces_of = |set: &Vec<u64>| set.iter().copied().filter(|&k| k < first_form).collect::<Vec<u64>>();
+        let mut sets: BTreeSet<Vec<u64>> = on.values().flat_map(|set| [set.clone(), surfaces_of(set)]).collect();
+        sets.insert(Vec::new());
         let packed: Vec<u64> =
             sets.iter().flat_map(|set| std::iter::once(set.len() as u64).chain(set.iter().copied())).collect();
         for mut theirs in of_ranks(comm, &packed).iter().map(|theirs| &theirs[..]) {
@@ -75,26 +85,51 @@ impl Refinable {
             }
         }
         let sets: Vec<Vec<u64>> = sets.into_iter().collect();
-        let of_face = |corners: [u32; 3]| {
-            let set = on.get(&key(&corners)).map_or(&[][..], |set| &set[..]);
-            sets.binary_search_by(|other| other[..].cmp(set)).expect("every set is listed") as u32
-        };
+        let number =
+            |set: &[u64]| sets.binary_search_by(|other| other[..].cmp(set)).expect("every set is listed") as u32;
+        let without_form = sets.iter().map(|set| number(&surfaces_of(set))).collect();
+        let of_face = |corners: [u32; 3]| number(on.get(&key(&corners)).map_or(&[][..], |set| &set[..]));
         let cells = (0..portion.len()).map(|at| Cell::new(portion, mesh.pieces[at], at, &of_face)).collect();
         let at_nodes = portion.points.iter().map(|&place| [place, [0.0; 3]]);
         let mut refinable = Self {
-            kind,
+            kind: portion.elements.kind(),
             cells,
             nodes: portion.nodes.iter().copied().zip(at_nodes).collect(),
             counts: mesh.counts,
             piece_count: mesh.piece_count,
             surfaces: mesh.surfaces.iter().map(|surface| surface.name.clone()).collect(),
+            without_form,
             sets,
-            form,
+            round: Round::new(forms),
         };
-        if kind.degree() > portion.elements.kind().degree() {
+        if kind.degree() > refinable.kind.degree() {
+            refinable.straighten(comm, kind);
+            refinable.kind = kind;
             refinable.raise(comm);
         }
         refinable
+    }
+
+    /// Leaves edges straight that would spoil linear elements as edges of quadratic ones of a kind. Collective.
+    fn straighten(&mut self, comm: &dyn Comm, kind: Kind) {
+        let mut nodes: Vec<u32> = self.nodes().collect();
+        nodes.sort_unstable();
+        let mut spoilt = BTreeSet::new();
+        loop {
+            let mut straight: Vec<(Vec<u32>, usize)> = Vec::new();
+            for cell in &mut self.cells {
+                if self.round.is_spoilt([self.kind, kind], cell, |node| self.nodes[&node][0]) {
+                    cell.flatten(|set| self.without_form[set as usize]);
+                    straight.extend(cell.edges().map(|edge| (edge.to_vec(), 0)));
+                    spoilt.insert(cell.number);
+                }
+            }
+            if sum(comm, vec![straight.len() as u64]) == [0] {
+                break;
+            }
+            forward(comm, &nodes, 2, &straight).keys().for_each(|edge| self.round.straighten([edge[0], edge[1]]));
+        }
+        self.round.spoilt = sum(comm, vec![spoilt.len() as u64])[0];
     }
 
     /// Puts nodes in the middle of all edges. Collective.
@@ -107,9 +142,14 @@ impl Refinable {
         for (&edge, &node) in &middles {
             let [a, b] = edge.map(|end| self.nodes[&end][0]);
             let middle = std::array::from_fn(|axis| 0.5 * a[axis] + 0.5 * b[axis]);
-            self.nodes.insert(node, [self.on_form(edge, middle), [0.0; 3]]);
+            self.nodes.insert(node, [self.round.put(edge, middle), [0.0; 3]]);
         }
         self.cells.iter_mut().for_each(|cell| cell.raise(&middles));
+    }
+
+    /// The forms that faces follow.
+    pub fn round(&self) -> &Round {
+        &self.round
     }
 
     /// Numbers within the body of the nodes that this rank has.
@@ -162,12 +202,15 @@ impl Refinable {
         let mut outgoing = vec![Vec::new(); comm.size()];
         for (cell, &owner) in self.cells.iter().zip(&owners) {
             cell.pack(self.kind, &self.nodes, &mut outgoing[owner as usize]);
+            self.round.pack(cell, &mut outgoing[owner as usize]);
         }
         self.cells.clear();
         self.nodes.clear();
+        self.round.clear();
         for message in comm.all_to_all(outgoing) {
             let mut words = message.into_iter();
             while let Some(cell) = Cell::unpack(self.kind, &mut words, &mut self.nodes) {
+                self.round.unpack(&cell, &mut words);
                 self.cells.push(cell);
             }
         }
@@ -184,7 +227,8 @@ impl Refinable {
         let mut surfaces: Vec<NamedSurface> =
             self.surfaces.iter().map(|name| NamedSurface { name: name.clone(), faces: Vec::new() }).collect();
         for (face, set) in cells.iter().flat_map(|cell| cell.faces(self.kind)) {
-            self.sets[set as usize].iter().for_each(|&k| surfaces[k as usize].faces.push(face.clone()));
+            let of_set = self.sets[set as usize].iter().filter_map(|&k| usize::try_from(k).ok());
+            of_set.filter(|&k| k < self.surfaces.len()).for_each(|k| surfaces[k].faces.push(face.clone()));
         }
         SolidMesh {
             portion,
@@ -195,10 +239,10 @@ impl Refinable {
         }
     }
 
-    /// Where the middle of an edge of the form belongs.
-    fn on_form(&self, [a, b]: Edge, middle: [f64; 3]) -> [f64; 3] {
-        let ends = [a, b].map(|node| self.nodes[&node][0]);
-        self.form.as_ref().map_or(middle, |form| form.on_surface(ends, middle))
+    /// The form that the faces of a set are on.
+    fn form(&self, set: u32) -> Option<u32> {
+        let last = *self.sets[set as usize].last()? as usize;
+        last.checked_sub(self.surfaces.len()).map(|form| form as u32)
     }
 }
 
@@ -284,10 +328,14 @@ impl Sweeps {
         let keys: Vec<[u64; 2]> = new.iter().map(|(edge, _)| edge.map(u64::from)).collect();
         let numbers = self.register.numbers(comm, &keys);
         mesh.counts.nodes = self.register.count();
+        self.middles.extend(new.iter().map(|(edge, _)| *edge).zip(numbers.iter().copied()));
+        for &at in due {
+            let cell = &mesh.cells[at];
+            let across = cell.faces_across().map(|(node, set)| (node, mesh.form(set)));
+            mesh.round.bisect(cell.refinement_edge(), self.middles[&cell.refinement_edge()], across);
+        }
         for ((edge, [place, displacement]), node) in new.into_iter().zip(numbers) {
-            let place = mesh.on_form(edge, place);
-            mesh.nodes.insert(node, [place, displacement]);
-            self.middles.insert(edge, node);
+            mesh.nodes.insert(node, [mesh.round.put(edge, place), displacement]);
             let sharers = self.both(edge);
             if !sharers.is_empty() {
                 self.sharers.insert(node, sharers);

@@ -3,7 +3,9 @@ use super::*;
 use crate::comm::solo::Solo;
 use crate::comm::threads;
 use crate::element::sample::samples;
+use crate::mesh::Mapped;
 use crate::mesh::faces::Neighbours;
+use crate::mesh::form::Form;
 use crate::mesh::quality::Quality;
 use crate::mesh::surface::areas;
 use crate::random::Random;
@@ -97,7 +99,7 @@ fn random_refinements_of_random_meshes_are_sound_and_keep_their_shape() {
         let start = random_mesh(&mut random, kind);
         let (volume, areas) = sizes(&start);
         let first = worst(&start);
-        let mut mesh = Refinable::new(&Solo, &start, None, kind);
+        let mut mesh = Refinable::new(&Solo, &start, Forms::default(), kind);
         for _ in 0..4 {
             let (share, times) = (0.05 + 0.1 * (1.0 + random.number()), 1 + (1.0 + random.number()) as usize);
             let wanted = some(&mut random, &mesh.mesh(), share, times);
@@ -117,7 +119,8 @@ fn a_refined_mesh_is_the_same_on_any_ranks() {
         let body = Mapped::Sphere { radii: [1.0, 2.0], cells: [2, 2] };
         let refined = |comm: &dyn Comm| {
             let mut random = Random::new(2);
-            let mut mesh = Refinable::new(comm, &body.mesh(comm, kind), Some(body.clone()), kind);
+            let start = body.mesh(comm, kind);
+            let mut mesh = Refinable::new(comm, &start, body.forms(comm, &start), kind);
             for times in [1, 3, 2] {
                 // Any rank may name an element: here rank 0 names those near a corner, or all.
                 let wanted = some(&mut random, &mesh.mesh(), 1.0, times).into_iter();
@@ -170,7 +173,7 @@ fn displacements_are_passed_on_exactly() {
         let of = |x: [f64; 3]| {
             [x[0] - 2.0 * x[2], quadratic * x[0] * x[1] + x[1], quadratic * (x[2] * x[2] - x[0] * x[2]) + 3.0]
         };
-        let mut mesh = Refinable::new(&Solo, &start, None, kind);
+        let mut mesh = Refinable::new(&Solo, &start, Forms::default(), kind);
         let places: HashMap<u32, [f64; 3]> =
             start.portion.nodes.iter().copied().zip(start.portion.points.clone()).collect();
         mesh.displace(|node| of(places[&node]));
@@ -197,10 +200,10 @@ fn curved_elements_are_refined_on_their_surface() {
         let start = body.mesh(&Solo, kind);
         let volume = sizes(&start).0;
         let all = |mesh: &SolidMesh| some(&mut Random::new(1), mesh, 1.0, 3);
-        let mut blind = Refinable::new(&Solo, &start, None, kind);
+        let mut blind = Refinable::new(&Solo, &start, Forms::default(), kind);
         blind.refine(&Solo, &all(&start));
         assert!((sizes(&blind.mesh()).0 / volume - 1.0).abs() < 1e-12);
-        let mut mesh = Refinable::new(&Solo, &start, Some(body.clone()), kind);
+        let mut mesh = Refinable::new(&Solo, &start, body.forms(&Solo, &start), kind);
         let mut errors = vec![(volume - exact).abs()];
         for _ in 0..2 {
             let wanted = all(&mesh.mesh());
@@ -225,15 +228,12 @@ fn curved_elements_are_refined_on_their_surface() {
 #[test]
 fn linear_meshes_become_quadratic() {
     let planes = [vec![0.0, 1.0, 3.0], vec![0.0, 2.0], vec![0.0, 1.0]];
-    for (body, form) in [
-        (Mapped::Grid { planes }, None),
-        (
-            Mapped::Sphere { radii: [1.0, 2.0], cells: [2, 1] },
-            Some(Mapped::Sphere { radii: [1.0, 2.0], cells: [2, 1] }),
-        ),
-    ] {
+    for (body, is_straight) in
+        [(Mapped::Grid { planes }, true), (Mapped::Sphere { radii: [1.0, 2.0], cells: [2, 1] }, false)]
+    {
         let places = |comm: &dyn Comm| {
-            let raised = Refinable::new(comm, &body.mesh(comm, Kind::Tet4), form.clone(), Kind::Tet10);
+            let start = body.mesh(comm, Kind::Tet4);
+            let raised = Refinable::new(comm, &start, body.forms(comm, &start), Kind::Tet10);
             let mesh = raised.mesh();
             assert!(Quality::of(comm, &mesh.portion).is_sound());
             (mesh.counts, mesh.portion.nodes.iter().map(|&node| (node, *raised.at(node))).collect::<Vec<_>>())
@@ -241,7 +241,7 @@ fn linear_meshes_become_quadratic() {
         let (counts, alone) = places(&Solo);
         let quadratic = body.mesh(&Solo, Kind::Tet10);
         assert_eq!((counts.nodes, counts.elements), (quadratic.counts.nodes, quadratic.counts.elements));
-        if form.is_none() {
+        if is_straight {
             let sorted = |points: Vec<[f64; 3]>| {
                 let mut bits: Vec<[u64; 3]> = points.into_iter().map(|x| x.map(f64::to_bits)).collect();
                 bits.sort_unstable();
@@ -253,5 +253,77 @@ fn linear_meshes_become_quadratic() {
         parts.sort_by_key(|(node, _)| *node);
         parts.dedup();
         assert_eq!(parts, alone);
+    }
+}
+
+/// Quadratic elements of linear ones, a sphere through some of their faces.
+fn raised(body: &[[u32; 4]], places: &[[f64; 3]], faces: &[[u32; 3]]) -> Refinable {
+    let portion = Portion::new(Kind::Tet4, 0, body.as_flattened(), |node| places[node as usize]);
+    let [nodes, elements] = [places.len(), body.len()].map(|count| count as u64);
+    let forms = Forms::new(
+        &Solo,
+        &portion.nodes,
+        vec![Form::Sphere { centre: [0.0; 3], radius: 1.0 }],
+        faces.iter().map(|face| (key(face), 0)).collect(),
+    );
+    let mesh = SolidMesh {
+        pieces: vec![0; body.len()],
+        portion,
+        surfaces: Vec::new(),
+        piece_count: 1,
+        counts: Counts { nodes, cells: elements, elements },
+    };
+    Refinable::new(&Solo, &mesh, forms, Kind::Tet10)
+}
+
+fn middles(mesh: &Refinable) -> HashMap<Edge, [f64; 3]> {
+    let of_cell =
+        |cell: &Cell| cell.middles(Kind::Tet10).map(|(edge, node)| (edge, mesh.at(node)[0])).collect::<Vec<_>>();
+    mesh.cells.iter().flat_map(of_cell).collect()
+}
+
+/// The edge between two faces of one element on a sphere would be smooth: there the element would have no volume. Its edges stay
+/// straight, the others do not.
+#[test]
+fn an_element_with_two_faces_on_a_sphere_keeps_its_edges() {
+    let on = |x: f64, y: f64| [x, y, (1.0 - x * x - y * y).sqrt()];
+    let places = [on(0.0, 0.2), on(0.0, -0.2), on(0.6, 0.0), on(-0.6, 0.0), [0.0; 3], on(0.5, 0.5)];
+    let elements = [[1, 0, 2, 3], [0, 2, 3, 4], [1, 3, 2, 4], [4, 0, 2, 5]];
+    let mut mesh = raised(&elements, &places, &[[0, 1, 2], [0, 1, 3], [0, 2, 5]]);
+    assert_eq!((mesh.round().count(), mesh.round().spoilt), (1, 1));
+    let distance = |mesh: &Refinable, edge: Edge| length(middles(mesh)[&edge]);
+    for (edge, is_straight) in [([0, 1], true), ([0, 2], true), ([1, 3], true), ([0, 5], false), ([2, 5], false)] {
+        assert_eq!(distance(&mesh, edge) < 1.0 - 1e-3, is_straight, "{edge:?}");
+    }
+    assert!(Quality::of(&Solo, &mesh.mesh().portion).is_sound());
+    let wanted = some(&mut Random::new(1), &mesh.mesh(), 1.0, 6);
+    mesh.refine(&Solo, &wanted);
+    assert!(Quality::of(&Solo, &mesh.mesh().portion).is_sound());
+    // Two edges, each in four, and those within the face between them.
+    let on_sphere = middles(&mesh).values().filter(|x| (length(**x) - 1.0).abs() < 1e-14).count();
+    assert!(on_sphere > 2 * 4, "{on_sphere}");
+}
+
+/// A shell that is thinner than its faces are curved keeps them.
+#[test]
+fn edges_that_would_turn_elements_inside_out_stay_straight() {
+    for (outer, is_round) in [(1.02, false), (1.5, true)] {
+        let body = Mapped::Sphere { radii: [1.0, outer], cells: [2, 1] };
+        let found = |comm: &dyn Comm| {
+            let start = body.mesh(comm, Kind::Tet4);
+            let mesh = Refinable::new(comm, &start, body.forms(comm, &start), Kind::Tet10);
+            assert!(Quality::of(comm, &mesh.mesh().portion).is_sound());
+            let mut placed: Vec<(Edge, [f64; 3])> = middles(&mesh).into_iter().collect();
+            placed.sort_by_key(|(edge, _)| *edge);
+            (mesh.round().spoilt, placed)
+        };
+        let (spoilt, alone) = found(&Solo);
+        assert_eq!(spoilt == 0, is_round, "{outer}: {spoilt}");
+        let parts = threads::run(3, found);
+        assert!(parts.iter().all(|(found, _)| *found == spoilt));
+        let mut placed: Vec<(Edge, [f64; 3])> = parts.into_iter().flat_map(|(_, placed)| placed).collect();
+        placed.sort_by_key(|(edge, _)| *edge);
+        placed.dedup();
+        assert_eq!(placed, alone);
     }
 }

@@ -5,6 +5,7 @@ use crate::element::sample::samples;
 use crate::mesh::faces::Neighbours;
 use crate::mesh::quality::Quality;
 use crate::mesh::surface::areas;
+use crate::vector::length;
 use std::f64::consts::PI;
 
 const SPHERE: Mapped = Mapped::Sphere { radii: [100.0, 200.0], cells: [4, 4] };

@@ -85,7 +85,8 @@ fn bodies_from_mesh_files_are_checked() {
         Scene::from_text(&text, "dir/one.toml", 1, &[])
     };
     let scene = gmsh("gmsh = { file = 'part.msh' }").unwrap();
-    let plain = Gmsh { file: "part.msh".into(), volume: None, scale: 1.0, rotate: None, translate: [0.0; 3] };
+    let plain =
+        Gmsh { file: "part.msh".into(), volume: None, scale: 1.0, rotate: None, translate: [0.0; 3], faceted: false };
     assert_eq!((scene.body["block"].gmsh(), scene.directory.to_str()), (Some(&plain), Some("dir")));
     assert_eq!(scene.support["base"].surface.surface, "the bottom");
     let all = "gmsh = { file = 'p.msh', volume = 'a b', scale = 1e3, rotate = { axis = [0, 0, 1], angle_deg = -30 }, \

@@ -18,7 +18,9 @@ use crate::comm::Comm;
 use crate::comm::words::share;
 use crate::decomposition::BodyMesh;
 use crate::feti::Torn;
-use crate::mesh::bisection::Refinable;
+use crate::mesh::SolidMesh;
+use crate::mesh::bisection::{Refinable, Round};
+use crate::mesh::form::Forms;
 use crate::model::Discrete;
 use crate::model::meshes::{MeshError, Meshes, mapped};
 use crate::results::checkpoint::Checkpoint;
@@ -34,6 +36,8 @@ pub struct Adaptive {
     bodies: Vec<Refinable>,
     /// What the user should know of them.
     pub warnings: Vec<String>,
+    /// What was made of their surfaces, in words.
+    pub notes: Vec<String>,
     /// What this rank named for each refinement.
     past: Vec<Wanted>,
 }
@@ -51,9 +55,18 @@ impl Adaptive {
             made => made,
         };
         let Meshes { solids, warnings, .. } = made?;
-        let of = |(body, mesh): (&scene::Body, _)| Refinable::new(comm, mesh, mapped(&body.shape), body.element);
-        let bodies = scene.body.values().zip(solids.values()).map(of).collect();
-        Ok(Self { bodies, warnings, past: Vec::new() })
+        let of = |(body, mesh): (&scene::Body, &SolidMesh)| {
+            let forms = match (mapped(&body.shape), body.gmsh()) {
+                (Some(mapped), _) => mapped.forms(comm, mesh),
+                (None, Some(gmsh)) if !gmsh.faceted => Forms::found(comm, mesh),
+                _ => Forms::default(),
+            };
+            Refinable::new(comm, mesh, forms, body.element)
+        };
+        let bodies: Vec<Refinable> = scene.body.values().zip(solids.values()).map(of).collect();
+        let from_file = scene.body.iter().zip(&bodies).filter(|((_, body), _)| body.gmsh().is_some());
+        let notes = from_file.flat_map(|((name, _), mesh)| notes(name, mesh.round())).collect();
+        Ok(Self { bodies, warnings, notes, past: Vec::new() })
     }
 
     /// This rank's parts of the meshes.
@@ -141,6 +154,15 @@ pub fn parts(discrete: &Discrete, solved: &Solved, of: &ErrorOf) -> Vec<Vec<f64>
             largest(fields::STRESS_ERROR).into_iter().map(squares).collect()
         }
     }
+}
+
+/// What is said of the round forms that were found among the faces of a body, and of the elements that cannot follow them.
+fn notes(body: &str, round: &Round) -> Vec<String> {
+    let found = format!("spheres, cones or tori that finer meshes follow (not with body.{body}.gmsh.faceted = true)");
+    let spoilt =
+        "elements with straight edges there, which curved ones would turn inside out; a finer mesh avoids that";
+    let text = |(what, count): (&str, u64)| (count > 0).then(|| format!("body {body}: {what}: {count}"));
+    [(&found[..], round.count() as u64), (spoilt, round.spoilt)].into_iter().filter_map(text).collect()
 }
 
 /// Numbers of a bisected element in a checkpoint: its corners, and how often.
