@@ -1,4 +1,4 @@
-//! Faces with marks, as the surfaces that they are on, on their way to the ranks that have their nodes.
+//! Faces with marks, as the surfaces that they are on, on their way to the ranks that have their nodes; edges and elements, too.
 
 use std::collections::HashMap;
 

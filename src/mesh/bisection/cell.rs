@@ -104,9 +104,11 @@ impl Cell {
         [(self.nodes[2], self.on[3]), (self.nodes[3], self.on[2])]
     }
 
-    /// Takes the forms from its faces; `without_form` tells the set of surfaces of a face that leaves its form.
-    pub fn flatten(&mut self, without_form: impl Fn(u32) -> u32) {
-        self.on = self.on.map(without_form);
+    /// Takes the forms from faces with straight edges; `without_form` tells the set of surfaces of a face that leaves its form.
+    pub fn flatten(&mut self, is_straight: impl Fn(Edge) -> bool, without_form: impl Fn(u32) -> u32) {
+        let of_face = |[a, b, c]: [usize; 3]| [(a, b), (b, c), (a, c)].map(|(a, b)| edge(self.nodes[a], self.nodes[b]));
+        let is_flat = OPPOSITE.map(|face| of_face(face).into_iter().any(&is_straight));
+        self.on = std::array::from_fn(|face| if is_flat[face] { without_form(self.on[face]) } else { self.on[face] });
     }
 
     /// What is at the nodes that bisection makes, in the middle of which edges.

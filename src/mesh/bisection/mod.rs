@@ -6,7 +6,7 @@
 //! ranks tell each other which edges on their borders are bisected.
 //!
 //! A `cell` inherits region, piece and surfaces. Straight elements are split exactly; so are curved ones of second order, whose
-//! halves are the same quadratic patch. On spheres and cylinders of the body new nodes are put on the surface ([`Forms`], `round`).
+//! halves are the same quadratic patch. On round surfaces of the body new nodes are put on the form ([`Forms`], `round`).
 //! Every node carries a displacement, which is passed on as shape functions interpolate it: exactly, where nodes are not moved.
 
 mod cell;
@@ -110,16 +110,16 @@ impl Refinable {
         refinable
     }
 
-    /// Leaves edges straight that would spoil linear elements as edges of quadratic ones of a kind. Collective.
-    fn straighten(&mut self, comm: &dyn Comm, kind: Kind) {
+    /// Leaves edges straight that would spoil linear elements as edges of quadratic ones of a kind, and the faces at them as they are.
+    /// Collective.
+    fn straighten(&mut self, comm: &dyn Comm, quadratic: Kind) {
         let mut nodes: Vec<u32> = self.nodes().collect();
         nodes.sort_unstable();
         let mut spoilt = BTreeSet::new();
         loop {
             let mut straight: Vec<(Vec<u32>, usize)> = Vec::new();
-            for cell in &mut self.cells {
-                if self.round.is_spoilt([self.kind, kind], cell, |node| self.nodes[&node][0]) {
-                    cell.flatten(|set| self.without_form[set as usize]);
+            for cell in &self.cells {
+                if self.round.is_spoilt([self.kind, quadratic], cell, |node| self.nodes[&node][0]) {
                     straight.extend(cell.edges().map(|edge| (edge.to_vec(), 0)));
                     spoilt.insert(cell.number);
                 }
@@ -127,7 +127,12 @@ impl Refinable {
             if sum(comm, vec![straight.len() as u64]) == [0] {
                 break;
             }
-            forward(comm, &nodes, 2, &straight).keys().for_each(|edge| self.round.straighten([edge[0], edge[1]]));
+            let straight: HashSet<Edge> =
+                forward(comm, &nodes, 2, &straight).into_keys().map(|edge| [edge[0], edge[1]]).collect();
+            straight.iter().for_each(|&edge| self.round.straighten(edge));
+            for cell in &mut self.cells {
+                cell.flatten(|edge| straight.contains(&edge), |set| self.without_form[set as usize]);
+            }
         }
         self.round.spoilt = sum(comm, vec![spoilt.len() as u64])[0];
     }
@@ -140,9 +145,9 @@ impl Refinable {
         let middles: HashMap<Edge, u32> = edges.into_iter().zip(register.numbers(comm, &keys)).collect();
         self.counts.nodes = register.count();
         for (&edge, &node) in &middles {
-            let [a, b] = edge.map(|end| self.nodes[&end][0]);
-            let middle = std::array::from_fn(|axis| 0.5 * a[axis] + 0.5 * b[axis]);
-            self.nodes.insert(node, [self.round.put(edge, middle), [0.0; 3]]);
+            let ends = edge.map(|end| self.nodes[&end][0]);
+            let middle = std::array::from_fn(|axis| 0.5 * ends[0][axis] + 0.5 * ends[1][axis]);
+            self.nodes.insert(node, [self.round.put(edge, ends, middle), [0.0; 3]]);
         }
         self.cells.iter_mut().for_each(|cell| cell.raise(&middles));
     }
@@ -227,7 +232,7 @@ impl Refinable {
         let mut surfaces: Vec<NamedSurface> =
             self.surfaces.iter().map(|name| NamedSurface { name: name.clone(), faces: Vec::new() }).collect();
         for (face, set) in cells.iter().flat_map(|cell| cell.faces(self.kind)) {
-            let of_set = self.sets[set as usize].iter().filter_map(|&k| usize::try_from(k).ok());
+            let of_set = self.sets[set as usize].iter().map(|&k| k as usize);
             of_set.filter(|&k| k < self.surfaces.len()).for_each(|k| surfaces[k].faces.push(face.clone()));
         }
         SolidMesh {
@@ -335,7 +340,8 @@ impl Sweeps {
             mesh.round.bisect(cell.refinement_edge(), self.middles[&cell.refinement_edge()], across);
         }
         for ((edge, [place, displacement]), node) in new.into_iter().zip(numbers) {
-            mesh.nodes.insert(node, [mesh.round.put(edge, place), displacement]);
+            let ends = edge.map(|end| mesh.nodes[&end][0]);
+            mesh.nodes.insert(node, [mesh.round.put(edge, ends, place), displacement]);
             let sharers = self.both(edge);
             if !sharers.is_empty() {
                 self.sharers.insert(node, sharers);

@@ -2,15 +2,18 @@
 //!
 //! Halves of an edge are on its forms. An edge that cuts a face in two is on the form of the face; only elements that come from the
 //! one with this face have it, so its rank knows. Linear elements that become quadratic get curved edges. That would turn some inside
-//! out: those with two faces on one smooth surface, and those that are flatter than their neighbours are curved. Their edges stay straight.
+//! out: those with two faces on one smooth surface, and those that are flatter than their neighbours are curved. Their edges stay straight, and the faces at these
+//! edges as they are.
 
 use std::collections::HashMap;
 
 use super::cell::{Cell, Edge, edge};
 use crate::element::Kind;
 use crate::mesh::form::{Form, Forms, project};
-use crate::vector::Point;
+use crate::vector::{Point, difference, length};
 
+/// Nodes on an edge are moved by less than this share of it: the sagitta of a third of a circle is 0.29 of its chord.
+const NEAR: f64 = 0.3;
 /// Curved elements have at least this share of the shape of straight ones.
 const SHAPE: f64 = 0.2;
 
@@ -34,10 +37,11 @@ impl Round {
         self.forms.iter().filter(|form| form.is_curved()).count()
     }
 
-    /// Where a node on an edge belongs.
-    pub fn put(&self, edge: Edge, place: Point) -> Point {
+    /// Where a node on an edge belongs that is between these ends.
+    pub fn put(&self, edge: Edge, ends: [Point; 2], place: Point) -> Point {
         let Some(&forms) = self.edges.get(&edge) else { return place };
-        project(forms.map(|form| &self.forms[form as usize]), place)
+        let within = NEAR * length(difference(ends[1], ends[0]));
+        project(forms.map(|form| &self.forms[form as usize]), place, within).unwrap_or(place)
     }
 
     /// An edge is bisected at a node; `across` has the corners opposite to it in the faces of an element, and their forms.
@@ -56,9 +60,9 @@ impl Round {
         if !edges.iter().any(|edge| self.edges.contains_key(edge)) {
             return false;
         }
-        let middle = |&[a, b]: &Edge| {
-            let [x, y] = [a, b].map(&place);
-            self.put([a, b], std::array::from_fn(|axis| 0.5 * x[axis] + 0.5 * y[axis]))
+        let middle = |&edge: &Edge| {
+            let [x, y] = edge.map(&place);
+            self.put(edge, [x, y], std::array::from_fn(|axis| 0.5 * x[axis] + 0.5 * y[axis]))
         };
         let corners = cell.corners().map(&place);
         let curved: Vec<Point> = corners.into_iter().chain(edges.iter().map(middle)).collect();

@@ -9,10 +9,11 @@
 //! - any two circles about one axis are on a sphere, and so are a tip and one circle: a sphere must have [`INNER`] nodes all
 //!   around which it goes on.
 //!
-//! Two circles about one axis are a cylinder or a cone. A flat part with an inner node is no part of what is round.
+//! Two circles about one axis are a cylinder or a cone. A flat part with an inner node is no part of what is round. A plane beside a round
+//! form counts where no other smooth face goes on from it: facets of free forms do not.
 
-use std::collections::HashMap;
-use std::collections::VecDeque;
+use std::collections::{HashMap, HashSet, VecDeque};
+use std::f64::consts::TAU;
 
 use super::{Form, about, fit};
 use crate::mesh::surface::{SHARPEST, area_vector};
@@ -31,9 +32,10 @@ const INNER: usize = 3;
 /// Faces that a form is first fitted to: fewer where so many are not on one.
 const PATCHES: [usize; 4] = [150, 48, 24, 12];
 /// Faces around one that no form was found from are not tried.
-const TRIED: usize = 6;
-/// Fits to all faces of a form.
+const TRIED: usize = 12;
+/// Fits to all faces of a form, or to those that have so many of its nodes.
 const FITS: usize = 2;
+const SAMPLE: usize = 500;
 
 /// The faces of a surface.
 struct Surface {
@@ -57,10 +59,9 @@ struct Surface {
 pub fn find(faces: &[Vec<u32>], place: impl Fn(u32) -> Point) -> Vec<(Form, Vec<usize>)> {
     let surface = Surface::new(faces, place);
     let flat = surface.flat();
-    let is_plane: Vec<bool> = flat.iter().map(|part| surface.inner(part) > 0).collect();
     // What no round form may have: faces of planes, then also those of other forms.
     let mut taken = vec![false; faces.len()];
-    for (part, _) in flat.iter().zip(&is_plane).filter(|(_, is_plane)| **is_plane) {
+    for part in flat.iter().filter(|part| surface.inner(part) > 0) {
         part.iter().for_each(|&face| taken[face] = true);
     }
     let mut found: Vec<(Form, Vec<usize>)> = Vec::new();
@@ -69,20 +70,19 @@ pub fn find(faces: &[Vec<u32>], place: impl Fn(u32) -> Point) -> Vec<(Form, Vec<
         if taken[seed] || tried[seed] {
             continue;
         }
-        match surface.round(seed, &taken) {
-            Some((form, part)) => {
-                part.iter().for_each(|&face| taken[face] = true);
-                found.push((form, part));
-            }
-            None => surface.near(seed, TRIED, |face| !taken[face]).into_iter().for_each(|face| tried[face] = true),
-        }
+        let before = found.len();
+        found.extend(surface.grow(seed, &taken, &mut tried));
+        found[before..].iter().flat_map(|(_, part)| part).for_each(|&face| taken[face] = true);
     }
     let mut is_round = vec![false; faces.len()];
     found.iter().flat_map(|(_, part)| part).for_each(|&face| is_round[face] = true);
     for part in flat {
-        let meets_round = |&face: &usize| surface.sharp[face].iter().chain(&surface.smooth[face]).any(|&f| is_round[f]);
-        if part.iter().all(|&face| !is_round[face]) && part.iter().any(meets_round) {
-            found.extend(fit::plane(&surface.places_of(&part)).map(|form| (form, part)));
+        let of_part: HashSet<usize> = part.iter().copied().collect();
+        let ends = |face: &usize| surface.smooth[*face].iter().all(|other| of_part.contains(other) || is_round[*other]);
+        let meets = |face: &usize| surface.sharp[*face].iter().chain(&surface.smooth[*face]).any(|&f| is_round[f]);
+        if part.iter().all(|face| !is_round[*face] && ends(face)) && part.iter().any(meets) {
+            let plane = fit::plane(&surface.places_of(&part)).filter(|plane| surface.are_on(&part, plane));
+            found.extend(plane.map(|form| (form, part)));
         }
     }
     found
@@ -101,7 +101,7 @@ impl Surface {
         let edge = |[a, b, c]: [Point; 3]| [(a, b), (b, c), (c, a)].map(|(x, y)| length(difference(x, y)));
         let longest = faces.iter().map(|face| edge(corners(face)).into_iter().fold(0.0, f64::max)).collect();
         let (mut at_edge, mut around) = (HashMap::<[usize; 2], Vec<usize>>::new(), vec![Vec::new(); places.len()]);
-        let edges = |face: &[usize]| [0, 1, 2].map(|k| [face[k], face[(k + 1) % 3]].map(|node| node));
+        let edges = |face: &[usize]| [0, 1, 2].map(|k| [face[k], face[(k + 1) % 3]]);
         let key = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
         for (number, face) in faces.iter().enumerate() {
             edges(face).into_iter().for_each(|ends| at_edge.entry(key(ends)).or_default().push(number));
@@ -127,10 +127,10 @@ impl Surface {
     /// A face and those around it, in the order in which they are reached, but at most so many, of those that are wanted.
     fn near(&self, seed: usize, most: usize, is_wanted: impl Fn(usize) -> bool) -> Vec<usize> {
         let (mut reached, mut next) = (vec![seed], VecDeque::from([seed]));
-        let mut seen: HashMap<usize, ()> = HashMap::from([(seed, ())]);
+        let mut seen = HashSet::from([seed]);
         while let Some(face) = next.pop_front() {
             for &other in &self.smooth[face] {
-                if reached.len() < most && is_wanted(other) && seen.insert(other, ()).is_none() {
+                if reached.len() < most && is_wanted(other) && seen.insert(other) {
                     reached.push(other);
                     next.push_back(other);
                 }
@@ -156,40 +156,49 @@ impl Surface {
         parts
     }
 
-    /// The round form that a face is on with others that are not taken.
-    fn round(&self, seed: usize, taken: &[bool]) -> Option<(Form, Vec<usize>)> {
-        let are_on = |part: &[usize], form: &Form| part.iter().all(|&face| self.is_on(face, form));
+    /// The round form that a face is on with others that are not taken; if there is none, those that one was sought of are tried.
+    fn grow(&self, seed: usize, taken: &[bool], tried: &mut [bool]) -> Option<(Form, Vec<usize>)> {
+        let mut sought = self.near(seed, TRIED, |face| !taken[face]);
         for most in PATCHES {
             let patch = self.near(seed, most, |face| !taken[face]);
             let grown = |form: &Form| self.near(seed, usize::MAX, |face| !taken[face] && self.is_on(face, form));
             for fitted in [Self::cones, Self::spheres, Self::tori] {
-                let through = |part: &[usize]| fitted(self, part).into_iter().find(|form| are_on(part, form));
+                let through = |part: &[usize]| fitted(self, part).into_iter().find(|form| self.are_on(part, form));
                 let mut part = patch.clone();
                 let mut form = through(&part);
                 for _ in 0..FITS {
                     part = form.map_or(part, |form| grown(&form));
                     form = form.and_then(|_| through(&part));
                 }
-                if let Some(form) = form.filter(|form| self.is_evident(form, &part)) {
-                    return Some((form, part));
+                match form {
+                    Some(form) if self.is_evident(&form, &part) => return Some((form, part)),
+                    _ if part.len() > patch.len() => sought.extend(part),
+                    _ => (),
                 }
             }
         }
+        sought.into_iter().for_each(|face| tried[face] = true);
         None
     }
 
+    fn are_on(&self, part: &[usize], form: &Form) -> bool {
+        part.iter().all(|&face| self.is_on(face, form))
+    }
+
     fn cones(&self, part: &[usize]) -> Vec<Form> {
+        let part = sample(part);
         let normals: Vec<Point> = part.iter().map(|&face| self.normals[face]).collect();
-        fit::cones(&self.places_of(part), &normals)
+        fit::cones(&self.places_of(&part), &normals)
     }
 
     fn spheres(&self, part: &[usize]) -> Vec<Form> {
-        fit::sphere(&self.places_of(part)).into_iter().collect()
+        fit::sphere(&self.places_of(&sample(part))).into_iter().collect()
     }
 
     fn tori(&self, part: &[usize]) -> Vec<Form> {
+        let part = sample(part);
         let faces: Vec<[Point; 2]> = part.iter().map(|&face| [self.centre(face), self.normals[face]]).collect();
-        fit::torus(&self.places_of(part), &faces).into_iter().collect()
+        fit::torus(&self.places_of(&part), &faces).into_iter().collect()
     }
 
     fn centre(&self, face: usize) -> Point {
@@ -199,10 +208,11 @@ impl Surface {
 
     /// Whether all nodes of a face are on a form, and the face along it.
     fn is_on(&self, face: usize, form: &Form) -> bool {
-        let nodes = &self.faces[face];
-        let cosine = dot(form.distance(self.centre(face)).1, self.normals[face]).abs();
-        cosine >= SHARPEST.to_radians().cos() * length(self.normals[face])
-            && nodes.iter().all(|&node| form.distance(self.places[node]).0.abs() <= EXACT * self.longest[face])
+        let cosine = (0.5 * SHARPEST).to_radians().cos() * length(self.normals[face]);
+        self.faces[face].iter().all(|&node| {
+            let (distance, normal) = form.distance(self.places[node]);
+            distance.abs() <= EXACT * self.longest[face] && dot(normal, self.normals[face]).abs() >= cosine
+        })
     }
 
     /// Whether faces are on a form not by chance.
@@ -211,7 +221,14 @@ impl Surface {
         let lines = |angle: &dyn Fn(Point) -> f64| {
             let mut angles: Vec<f64> = places.iter().map(|&x| angle(x)).collect();
             angles.sort_by(f64::total_cmp);
-            1 + angles.windows(2).filter(|pair| pair[1] - pair[0] > APART).count()
+            let mut first = vec![angles[0]];
+            angles.iter().for_each(|&angle| {
+                if angle > first[first.len() - 1] + APART {
+                    first.push(angle)
+                }
+            });
+            let is_once_round = angles[angles.len() - 1] > angles[0] + TAU - APART;
+            first.len() - usize::from(is_once_round)
         };
         let around = |point: Point, axis: Point| {
             let [one, other] = fit::across(axis);
@@ -256,4 +273,9 @@ impl Surface {
         nodes.dedup();
         nodes.into_iter().map(|node| self.places[node]).collect()
     }
+}
+
+/// Some faces out of many.
+fn sample(part: &[usize]) -> Vec<usize> {
+    part.iter().step_by(part.len().div_ceil(SAMPLE)).copied().collect()
 }

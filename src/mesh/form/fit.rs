@@ -17,10 +17,11 @@ use faer::{Mat, Side};
 use super::{Form, about};
 use crate::vector::{Point, cross, difference, dot, length};
 
-/// Steps of the Gauss-Newton method; on exact places it takes about five.
+/// Steps of the Gauss-Newton method at most; on exact places it takes about five.
 const STEPS: usize = 12;
-/// Change of a parameter, relative to the extent, that derivatives are taken with.
-const CHANGE: f64 = 1e-6;
+/// It ends where a step leaves more than this share of the largest distance, but for the first steps.
+const LEFT: f64 = 0.5;
+const FIRST: usize = 3;
 /// Radii are at most so many times the extent of the places: what is flatter is taken for flat.
 const FLATTEST: f64 = 1e3;
 
@@ -96,20 +97,40 @@ pub fn torus(places: &[Point], faces: &[[Point; 2]]) -> Option<Form> {
 
 /// The form of least squares near one of the same kind.
 fn nearest(places: &[Point], mut form: Form) -> Option<Form> {
-    for _ in 0..STEPS {
-        let count = parameters(&form);
-        let unit = |k: usize, size: f64| std::array::from_fn(|j| if j == k { size } else { 0.0 });
-        let beside: Vec<[Form; 2]> =
-            (0..count).map(|k| [CHANGE, -CHANGE].map(|size| changed(&form, unit(k, size)))).collect();
-        let slope = |i: usize, k: usize| {
-            let [more, less] = beside[k].map(|form| form.distance(places[i]).0);
-            (more - less) / (2.0 * CHANGE)
-        };
-        let matrix = Mat::from_fn(places.len(), count, slope);
-        let step = solved(&matrix, |i| -form.distance(places[i]).0)?;
+    let mut before = f64::INFINITY;
+    for step in 0..STEPS {
+        let rows: Vec<(f64, [f64; 7])> = places.iter().map(|&x| linearised(&form, x)).collect();
+        let size = rows.iter().fold(0.0_f64, |most, (distance, _)| most.max(distance.abs()));
+        if step > FIRST && size >= LEFT * before {
+            break;
+        }
+        before = size;
+        let matrix = Mat::from_fn(places.len(), parameters(&form), |i, k| rows[i].1[k]);
+        let step = solved(&matrix, |i| -rows[i].0)?;
         form = changed(&form, std::array::from_fn(|k| step.get(k).copied().unwrap_or(0.0)));
     }
     Some(form)
+}
+
+/// The distance of a place from a cone or a torus, and its derivatives by what [`changed`] changes.
+fn linearised(form: &Form, x: Point) -> (f64, [f64; 7]) {
+    let (distance, gradient) = form.distance(x);
+    let (point, axis) = match *form {
+        Form::Cone { point, axis, .. } => (point, axis),
+        Form::Torus { centre, axis, .. } => (centre, axis),
+        Form::Plane { .. } | Form::Sphere { .. } => return (distance, [0.0; 7]),
+    };
+    let (along, from_axis, outwards) = about(x, point, axis);
+    // By the distance from the axis, by that along it, and by the last number.
+    let (by_distance, by_height) = (dot(gradient, outwards), dot(gradient, axis));
+    let by_last = match *form {
+        Form::Cone { radius, .. } => by_height * (from_axis - radius) - by_distance * along,
+        _ => -1.0,
+    };
+    let [one, other] = across(axis);
+    let turn = |direction| dot(difference(x, point), direction) * (by_height - by_distance * along / from_axis);
+    let shift = |direction| -dot(gradient, direction);
+    (distance, [shift(one), shift(other), turn(one), turn(other), -by_distance, by_last, -by_height])
 }
 
 /// Numbers that tell a cone or a torus.

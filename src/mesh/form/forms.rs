@@ -17,9 +17,9 @@ use crate::vector::Point;
 pub struct Forms {
     /// All of them, the same on every rank.
     pub all: Vec<Form>,
-    /// Those of own faces, by corners (ascending).
+    /// Those of faces, by corners (ascending): all own ones, and some others.
     pub faces: HashMap<Vec<u32>, u32>,
-    /// Those of own edges that are on a curved one: two, which may be the same.
+    /// Those of edges that are on a curved one, all own ones and some others: two, which may be the same.
     pub edges: HashMap<[u32; 2], [u32; 2]>,
 }
 

@@ -63,8 +63,8 @@ pub enum Form {
 const TOUCH: f64 = 1e-4;
 /// Steps of Newton's method at most.
 const STEPS: usize = 30;
-/// A place is on both forms if they are as near, relative to its distance from the first place.
-const NEAR: f64 = 1e-15;
+/// A step is as good as none, relative to the coordinates.
+const NOTHING: f64 = 1e-14;
 
 impl Form {
     /// Whether it is no plane.
@@ -106,8 +106,8 @@ fn about(x: Point, point: Point, axis: Point) -> (f64, f64, Point) {
     (along, distance, across.map(|c| c / distance))
 }
 
-/// The place on both forms, which may be the same one, next to a place near them.
-pub fn project(forms: [&Form; 2], place: Point) -> Point {
+/// The place on both forms, which may be the same one, within a distance of a place near them; none if it is not found there.
+pub fn project(forms: [&Form; 2], place: Point, within: f64) -> Option<Point> {
     let mut x = place;
     for _ in 0..STEPS {
         let [(d, g), (e, h)] = forms.map(|form| form.distance(x));
@@ -120,9 +120,9 @@ pub fn project(forms: [&Form; 2], place: Point) -> Point {
         };
         let step: Point = std::array::from_fn(|a| along_g * g[a] + along_h * h[a]);
         x = difference(x, step);
-        if length(step) <= NEAR * length(difference(x, place)) {
-            break;
+        if length(step) <= NOTHING * length(x) {
+            return (length(difference(x, place)) <= within).then_some(x);
         }
     }
-    x
+    None
 }

@@ -47,7 +47,7 @@ fn gradients_are_those_of_the_distances_and_unit_vectors() {
                 assert!((slope - gradient[axis]).abs() < 1e-6, "{form:?} {slope} {gradient:?}");
             }
             // From where it is, straight to the form.
-            assert!(form.distance(project([&form, &form], x)).0.abs() < 1e-12, "{form:?}");
+            assert!(form.distance(project([&form, &form], x, 99.0).unwrap()).0.abs() < 1e-12, "{form:?}");
         }
     }
 }
@@ -58,16 +58,21 @@ fn a_place_on_two_forms_is_where_they_cross_or_touch() {
     let cylinder = Form::Cone { point: [0.0; 3], axis, radius: 2.0, opening: 0.0 };
     let slant = Form::Plane { point: [0.0; 3], normal: [0.6, 0.0, 0.8] };
     let other = Form::Cone { point: [0.0; 3], axis: x, radius: 1.0, opening: 0.0 };
-    let [place, on_both] = [&slant, &other].map(|form| project([&cylinder, form], [1.7, 0.9, 0.4]));
+    let [place, on_both] = [&slant, &other].map(|form| project([&cylinder, form], [1.7, 0.9, 0.4], 9.0).unwrap());
     assert!((place[0] * place[0] + place[1] * place[1] - 4.0).abs() < 1e-13);
     assert!((0.6 * place[0] + 0.8 * place[2]).abs() < 1e-14);
     assert!((on_both[1] * on_both[1] + on_both[2] * on_both[2] - 1.0).abs() < 1e-13);
     assert!((on_both[0] * on_both[0] + on_both[1] * on_both[1] - 4.0).abs() < 1e-13);
     // A cap on the cylinder: both give the same.
     let cap = Form::Sphere { centre: [0.0; 3], radius: 2.0 };
-    let place = project([&cylinder, &cap], [1.2, 1.5, 0.0]);
+    let place = project([&cylinder, &cap], [1.2, 1.5, 0.0], 1.0).unwrap();
     let factor = 2.0 / 1.2_f64.hypot(1.5);
     assert!(length(difference(place, [1.2 * factor, 1.5 * factor, 0.0])) < 1e-13, "{place:?}");
+    // Too far, nowhere, or in no direction.
+    assert_eq!(project([&cylinder, &cap], [1.2, 1.5, 0.0], 1e-3), None);
+    let beyond = Form::Plane { point: [3.0, 0.0, 0.0], normal: [1.0, 0.0, 0.0] };
+    assert_eq!(project([&cylinder, &beyond], [1.9, 0.1, 0.0], 10.0), None);
+    assert_eq!(project([&cap, &cap], [0.0; 3], 10.0), None);
 }
 
 /// Triangles between places of a lattice, at random within it, in a random frame; `turn` closes its first direction.
@@ -126,7 +131,7 @@ fn forms_are_found_from_their_nodes() {
     };
     let shapes: [Shape; 7] = [
         ("cylinder", [24, 8], true, &bore),
-        ("cylinder", [12, 1], true, &bore),
+        ("cylinder", [15, 1], true, &bore),
         ("cylinder", [5, 2], false, &quarter),
         ("cone", [24, 4], true, &countersink),
         ("cone", [16, 1], true, &countersink),
@@ -243,4 +248,37 @@ fn bodies_are_known_by_their_mesh() {
             }
         }
     }
+}
+
+/// A cylinder that goes on in a fillet of three rows: too few, and its facets are no planes beside the cylinder.
+#[test]
+fn facets_are_no_planes() {
+    let profile = |p: f64, q: f64| {
+        let row = (6.0 * q).round();
+        let (sin, cos) = (20.0 * (row - 3.0).max(0.0)).to_radians().sin_cos();
+        let (radius, height) = (3.0 - cos, 0.7 * row.min(3.0) + sin);
+        [radius * (2.0 * PI * p).cos(), radius * (2.0 * PI * p).sin(), height]
+    };
+    let mut random = Random::new(5);
+    let frame = random_frame(&mut random);
+    let (faces, places) = lattice(&mut random, frame, [20, 6], 0.0, true, &profile);
+    let found = find(&faces, |node| places[node as usize]);
+    let [(Form::Cone { radius, .. }, part)] = &found[..] else { panic!("{found:?}") };
+    assert!((radius - 2.0).abs() < 1e-9 && part.len() == 2 * 3 * 20, "{radius} {}", part.len());
+}
+
+/// A form is told by however many nodes, in a time that grows with them.
+#[test]
+fn fine_meshes_of_forms_are_found_and_free_forms_do_not_take_long() {
+    let mut random = Random::new(6);
+    let frame = random_frame(&mut random);
+    let bore = |p: f64, q: f64| [2.0 * (2.0 * PI * p).cos(), 2.0 * (2.0 * PI * p).sin(), 6.0 * q];
+    let (faces, places) = lattice(&mut random, frame, [200, 100], 0.2, true, &bore);
+    let found = find(&faces, |node| places[node as usize]);
+    assert_eq!(found.iter().map(|(_, part)| part.len()).collect::<Vec<_>>(), [faces.len()]);
+    let bowl = |p: f64, q: f64| [p, q, 0.3 * (p * p + 1.5 * q * q + p * q * q)];
+    let (faces, places) = lattice(&mut random, frame, [60, 60], 0.2, false, &bowl);
+    let began = std::time::Instant::now();
+    assert!(find(&faces, |node| places[node as usize]).is_empty());
+    assert!(began.elapsed().as_secs_f64() < 1e-3 * faces.len() as f64, "{:?}", began.elapsed());
 }
