@@ -57,7 +57,7 @@ CASES = {
         sets=("body.inner.sphere.cells=[2, 2]", "body.outer.sphere.cells=[2, 2]"),
         uniform=tuple(spheres(["inner", "outer"], n) for n in (2, 3, 4, 6)),
     ),
-    "bolt": Case("scenes/bolt.toml", "four bodies from a mesh file, whose flat faces become round", ["2%", "1%", "0.5%"], fine="0.15%"),
+    "bolt": Case("scenes/bolt.toml", "four bodies from a mesh file of flat faces", ["2%", "1%", "0.5%"], fine="0.15%"),
     "hertz": Case("scenes/hertz.toml", "elastic contact, from a graded mesh file", ["0.2%", "0.1%", "0.05%"], fine="0.005%"),
     "punch": Case(
         "scenes/punch.toml", "a punch that is pressed into a block that yields, at once, from a mesh file", ["0.15%", "0.1%", "0.05%", "0.02%"],
