@@ -5,8 +5,8 @@
 //! [`split`] into tetrahedra where these are wanted, and put in [`placement`]. Each rank has a [`portion`] of what is stored:
 //! pieces of a [`curve`], as many as there are ranks, or as [`wholes`] have parts. [`elements`] are known by their nodes;
 //! [`faces`] tells which are neighbours, [`joints`] also on other ranks, [`marked`] brings names to faces, [`form`] finds what is
-//! round. [`surface`] integrates over boundary faces, [`quality`] counts elements that no computation could use, [`whole`] finds what only looks
-//! joined ([`boxes`] of what is [`near`]) and the pieces of a mesh by their [`connectivity`]. No displacements, no material.
+//! round. [`surface`] integrates over boundary faces, [`quality`] counts elements that no computation could use, [`whole`] finds
+//! what only looks joined ([`boxes`] of what is [`near`]) and the pieces of a mesh by their [`connectivity`]. No displacements, no material.
 
 pub mod bisection;
 pub mod boxes;

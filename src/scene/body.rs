@@ -125,7 +125,7 @@ pub struct Gmsh {
     /// What is added to all coordinates in the end.
     #[serde(default)]
     pub translate: [f64; 3],
-    /// Its faces are meant to be as flat as they are: refinement looks for no spheres and cylinders among them.
+    /// Its faces are meant to be as flat as they are: refinement looks for no round surfaces among them.
     #[serde(default)]
     pub faceted: bool,
 }

@@ -17,7 +17,7 @@ pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>), width: u32) -> Vec<u3
     let mut count = nodes as metis_sys::idx_t;
     let (mut forward, mut inverse) = (vec![0; nodes], vec![0; nodes]);
     let _alone = alone();
-    let mut ordered = || {
+    let ordered = || {
         // Safety: METIS reads the graph and writes `count` entries to each permutation; pointers and lengths agree.
         unsafe {
             metis_sys::METIS_NodeND(
@@ -31,7 +31,7 @@ pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>), width: u32) -> Vec<u3
             )
         }
     };
-    let status = undisturbed(&mut ordered, |status| *status == metis_sys::rstatus_et_METIS_ERROR);
+    let status = undisturbed(ordered, |status| *status == metis_sys::rstatus_et_METIS_ERROR);
     if status == metis_sys::rstatus_et_METIS_ERROR_MEMORY {
         exhausted(size_of_val(neighbours));
     }

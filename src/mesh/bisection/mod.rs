@@ -145,9 +145,8 @@ impl Refinable {
         let middles: HashMap<Edge, u32> = edges.into_iter().zip(register.numbers(comm, &keys)).collect();
         self.counts.nodes = register.count();
         for (&edge, &node) in &middles {
-            let ends = edge.map(|end| self.nodes[&end][0]);
-            let middle = std::array::from_fn(|axis| 0.5 * ends[0][axis] + 0.5 * ends[1][axis]);
-            self.nodes.insert(node, [self.round.put(edge, ends, middle), [0.0; 3]]);
+            let middle = self.round.middle(edge, edge.map(|end| self.nodes[&end][0]));
+            self.nodes.insert(node, [middle, [0.0; 3]]);
         }
         self.cells.iter_mut().for_each(|cell| cell.raise(&middles));
     }

@@ -2,8 +2,8 @@
 //!
 //! Halves of an edge are on its forms. An edge that cuts a face in two is on the form of the face; only elements that come from the
 //! one with this face have it, so its rank knows. Linear elements that become quadratic get curved edges. That would turn some inside
-//! out: those with two faces on one smooth surface, and those that are flatter than their neighbours are curved. Their edges stay straight, and the faces at these
-//! edges as they are.
+//! out: those with two faces on one smooth surface, and those that are flatter than their neighbours are curved. Their edges stay
+//! straight, and the faces at these edges as they are.
 
 use std::collections::HashMap;
 
@@ -44,6 +44,11 @@ impl Round {
         project(forms.map(|form| &self.forms[form as usize]), place, within).unwrap_or(place)
     }
 
+    /// Where the node in the middle of an edge belongs.
+    pub fn middle(&self, edge: Edge, ends: [Point; 2]) -> Point {
+        self.put(edge, ends, std::array::from_fn(|axis| 0.5 * ends[0][axis] + 0.5 * ends[1][axis]))
+    }
+
     /// An edge is bisected at a node; `across` has the corners opposite to it in the faces of an element, and their forms.
     pub fn bisect(&mut self, [a, b]: Edge, middle: u32, across: [(u32, Option<u32>); 2]) {
         if let Some(&forms) = self.edges.get(&[a, b]) {
@@ -60,10 +65,7 @@ impl Round {
         if !edges.iter().any(|edge| self.edges.contains_key(edge)) {
             return false;
         }
-        let middle = |&edge: &Edge| {
-            let [x, y] = edge.map(&place);
-            self.put(edge, [x, y], std::array::from_fn(|axis| 0.5 * x[axis] + 0.5 * y[axis]))
-        };
+        let middle = |&edge: &Edge| self.middle(edge, edge.map(&place));
         let corners = cell.corners().map(&place);
         let curved: Vec<Point> = corners.into_iter().chain(edges.iter().map(middle)).collect();
         quadratic.shape(&curved) < SHAPE * linear.shape(&corners)

@@ -70,9 +70,10 @@ pub fn find(faces: &[Vec<u32>], place: impl Fn(u32) -> Point) -> Vec<(Form, Vec<
         if taken[seed] || tried[seed] {
             continue;
         }
-        let before = found.len();
-        found.extend(surface.grow(seed, &taken, &mut tried));
-        found[before..].iter().flat_map(|(_, part)| part).for_each(|&face| taken[face] = true);
+        if let Some((form, part)) = surface.grow(seed, &taken, &mut tried) {
+            part.iter().for_each(|&face| taken[face] = true);
+            found.push((form, part));
+        }
     }
     let mut is_round = vec![false; faces.len()];
     found.iter().flat_map(|(_, part)| part).for_each(|&face| is_round[face] = true);
@@ -158,13 +159,16 @@ impl Surface {
 
     /// The round form that a face is on with others that are not taken; if there is none, those that one was sought of are tried.
     fn grow(&self, seed: usize, taken: &[bool], tried: &mut [bool]) -> Option<(Form, Vec<usize>)> {
-        let mut sought = self.near(seed, TRIED, |face| !taken[face]);
-        for most in PATCHES {
-            let patch = self.near(seed, most, |face| !taken[face]);
+        let near = self.near(seed, PATCHES[0], |face| !taken[face]);
+        let mut sought = near[..near.len().min(TRIED)].to_vec();
+        let mut sizes = PATCHES.map(|most| near.len().min(most)).to_vec();
+        sizes.dedup();
+        for size in sizes {
+            let patch = &near[..size];
             let grown = |form: &Form| self.near(seed, usize::MAX, |face| !taken[face] && self.is_on(face, form));
             for fitted in [Self::cones, Self::spheres, Self::tori] {
                 let through = |part: &[usize]| fitted(self, part).into_iter().find(|form| self.are_on(part, form));
-                let mut part = patch.clone();
+                let mut part = patch.to_vec();
                 let mut form = through(&part);
                 for _ in 0..FITS {
                     part = form.map_or(part, |form| grown(&form));

@@ -2,8 +2,8 @@
 //!
 //! Bricks are cut into cells of nearly equal edges, `ACROSS` of them across the thinnest brick, but no more than the scene has.
 //! Other structured bodies and meshes from files are taken as they are; straight elements of a file are curved where its faces stand
-//! for a round surface ([`crate::mesh::form`]). Elements become quadratic tetrahedra: for the same error they take a fraction of the unknowns of linear ones,
-//! which lock where the material flows.
+//! for a round surface ([`crate::mesh::form`]). Elements become quadratic tetrahedra: for the same error they take a fraction of the
+//! unknowns of linear ones, which lock where the material flows.
 
 use crate::element::Cell;
 use crate::element::Kind;
