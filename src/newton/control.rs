@@ -35,6 +35,8 @@ use crate::vector::dot;
 const FIRST: f64 = 6.0;
 /// What tangents are of the elastic stiffness at least: a mechanism is not free then, and what holds it tells how far it goes.
 const LEAST: f64 = 1e-4;
+/// Steps are up to so many times those that such tangents tell.
+pub const LONGEST: f64 = 64.0;
 
 /// Where the loads are.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

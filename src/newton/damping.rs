@@ -3,6 +3,9 @@
 //! The full step is taken where it lowers `J` enough. Otherwise the slope of the convex function `J(u + t du)` is
 //! brought near zero by regula falsi (Illinois variant), which the convexity makes safe. With friction that is `J` and what friction
 //! dissipates, with the radii of the new multipliers ([`super::friction`]).
+//!
+//! Tangents that are stiffer than the body ([`super::control`]) tell of steps that are too short. There the step is doubled as long as
+//! `J` falls at more than 0.8 of its first slope.
 
 use super::friction::Radii;
 use super::problem::{State, TornProblem};
@@ -13,6 +16,8 @@ use crate::monitor::timing::Timer;
 const SUFFICIENT: f64 = 1e-4;
 /// The slope is near zero when it is below this share of its first value.
 const FLAT: f64 = 0.1;
+/// A step ends too early where the slope is above this share of its first value.
+const STEEP: f64 = 0.8;
 /// Relative error of strains that are sums of cancelling terms.
 const ROUNDING: f64 = 1e-15;
 /// Evaluations of `J` before the direction is given up.
@@ -57,7 +62,7 @@ pub struct Damped {
     pub length: f64,
 }
 
-/// Searches from `u` along `du`, with these radii of friction. Where `u` is not `admissible` the energies cannot be compared and the
+/// Searches from `u` along `du`, with these radii of friction, for a length up to the `longest`, which is at least 1. Where `u` is not `admissible` the energies cannot be compared and the
 /// full step is taken.
 ///
 /// # Errors
@@ -65,7 +70,7 @@ pub struct Damped {
 pub fn search(
     problem: &TornProblem,
     (u, state): (&Torn, &State),
-    (du, radii): (&Torn, &Radii),
+    (du, radii, longest): (&Torn, &Radii, f64),
     admissible: bool,
     timer: &Timer,
 ) -> Result<Damped, Box<Damped>> {
@@ -97,7 +102,17 @@ pub fn search(
     };
     let slack = cost.slack(&full.u);
     if lowers(&full, &slack) {
-        return Ok(full);
+        let mut best = full;
+        while 2.0 * best.length <= longest
+            && cost.slope(&best.state, &cost.slack(&best.u), du) < STEEP * first_slope.min(0.0)
+        {
+            let next = trial(2.0 * best.length);
+            if cost.of(&next.state, &cost.slack(&next.u)) >= cost.of(&best.state, &cost.slack(&best.u)) {
+                break;
+            }
+            best = next;
+        }
+        return Ok(best);
     }
     // Illinois: the slope changes its sign between low and high, (length, slope) each.
     let mut low = (0.0, first_slope);

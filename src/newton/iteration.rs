@@ -6,7 +6,7 @@
 
 use std::mem::{replace, take};
 
-use super::control::{Control, firm};
+use super::control::{Control, LONGEST, firm};
 use super::damping::{self, Damped};
 use super::forcing::Forcing;
 use super::iterate::{self, Iterate};
@@ -264,7 +264,9 @@ impl<'a> Newton<'a> {
         }
         // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
         let radii = problem.radii(&step.lambda);
-        match damping::search(problem, (&iterate.u, &iterate.state), (&step.du, &radii), self.admissible, timer) {
+        let longest = if control.is_some() { LONGEST } else { 1.0 };
+        let from = (&iterate.u, &iterate.state);
+        match damping::search(problem, from, (&step.du, &radii, longest), self.admissible, timer) {
             Ok(damped) => Trial::Accepted(step, damped),
             Err(_) if !iterate.state.energy.is_finite() => Trial::Ended(Outcome::NotFinite),
             // With friction energies depend on radii, which are as exact as the program. Near the solution residuals tell more.
