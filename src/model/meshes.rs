@@ -205,9 +205,12 @@ fn check(scene: &Scene, body: &str, mesh: &SolidMesh, comm: &dyn Comm) -> Result
     }
     let mut warnings = Vec::new();
     if quality.worst_shape < POOR_SHAPE {
+        let way = match scene.body[body].gmsh() {
+            Some(_) => "try `Mesh.OptimizeNetgen = 1;`",
+            None => "cells with more even sides have none",
+        };
         warnings.push(format!(
-            "body {body}: its flattest element has {:.1e} of the shape of a regular one, which costs accuracy; try \
-             `Mesh.OptimizeNetgen = 1;`",
+            "body {body}: its flattest element has {:.1e} of the shape of a regular one, which costs accuracy; {way}",
             quality.worst_shape
         ));
     }
