@@ -18,7 +18,7 @@ use crate::scene::{ErrorOf, Scene};
 use crate::sizing::counts::Counted;
 use crate::study::adaptive::error::{estimate, is_history, is_known, vanishes};
 use crate::study::adaptive::start::{Start, start};
-use crate::study::adaptive::{Adaptive, marking, parts};
+use crate::study::adaptive::{Adaptive, counting, marking, parts};
 use crate::study::{Begin, Solved};
 
 /// A mesh aims at this share of the error of the one before at least: further off the estimate is not to be trusted ...
@@ -148,13 +148,8 @@ impl Run<'_> {
         began: f64,
     ) -> RefinementRow {
         let summary = &solved.summary;
-        // Equilibria on the way to a limit load compare where they did the same work: at the end of the first mesh, which is where
-        // others begin.
-        let steps = match &summary.steps[..] {
-            [.., last] if summary.limit_load.is_some() && is_first => std::slice::from_ref(last),
-            [first, ..] if summary.limit_load.is_some() => std::slice::from_ref(first),
-            all => all,
-        };
+        let increments = counting(summary, is_first);
+        let steps = &summary.steps[increments.clone()];
         let limit_load = steps.last().and_then(|row| row.limit_load);
         let of_limit = limit_load.map_or(0.0, |limit| limit.factor * limit.work);
         // Of all increments the largest, as elements have it.
@@ -178,7 +173,7 @@ impl Run<'_> {
             } else {
                 largest(|state| state.energy.map(f64::abs)).unwrap_or_default()
             },
-            distance: marking::total(self.comm, &parts(discrete, solved, &ErrorOf::Energy)),
+            distance: marking::total(self.comm, &parts(discrete, solved, &ErrorOf::Energy, increments)),
             gap: largest(|state| state.errors.duality_gap).unwrap_or_default(),
             stress: largest(|state| state.errors.discretisation).unwrap_or(f64::MAX),
             limit_load,
@@ -210,7 +205,8 @@ impl Run<'_> {
             // Its parts are squares.
             ErrorOf::Stress => share.max(SHARE.sqrt()).powi(2),
         };
-        let parts = parts(discrete, solved, of);
+        let increments = counting(&solved.summary, plan.refinements.len() == 1);
+        let parts = parts(discrete, solved, of, increments);
         let mut limit = String::new();
         for share in std::iter::once(share).chain(SMALLER.into_iter().filter(|&smaller| smaller > share)) {
             let mut finer = adaptive.clone();

@@ -72,6 +72,10 @@ pub trait Law {
     /// accurate for small changes as for large ones.
     fn divergence(&self, strain: &Voigt, change: &Voigt, committed: &Self::State) -> f64;
 
+    /// A strain one step away from `committed` that has this stress. Beyond the yield surface of what does not harden there is none:
+    /// there it is that of the stress on the surface that differs by a multiple of the deviator.
+    fn strain(&self, stress: &Voigt, committed: &Self::State) -> Voigt;
+
     /// The least that tangents are of the elastic stiffness; 1 for an elastic material.
     fn least_tangent(&self) -> f64;
 

@@ -59,6 +59,10 @@ macro_rules! laws {
                 match self { $(Self::$law(law) => law.divergence(strain, change, &committed.$name),)+ }
             }
 
+            fn strain(&self, stress: &Voigt, committed: &History) -> Voigt {
+                match self { $(Self::$law(law) => law.strain(stress, &committed.$name),)+ }
+            }
+
             fn least_tangent(&self) -> f64 {
                 match self { $(Self::$law(law) => law.least_tangent(),)+ }
             }

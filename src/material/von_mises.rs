@@ -301,6 +301,23 @@ impl Law for VonMises {
         (elastic - softer / (2.0 * self.plastic_modulus())).max(0.0)
     }
 
+    fn strain(&self, stress: &Voigt, committed: &PlasticState) -> Voigt {
+        let (bulk, mu) = (self.hooke().bulk_modulus(), self.hooke().shear_modulus());
+        let (volume, s, back) = (trace(stress) / (9.0 * bulk), deviator(stress), self.back_stress(committed));
+        let relative: Voigt = std::array::from_fn(|i| s[i] - back[i]);
+        let q = equivalent(&relative);
+        let strength = self.yield_stress.map_or(f64::INFINITY, |initial| initial + self.hardening * committed.kappa);
+        let (kept, flow) = match self.hardening + self.kinematic_hardening {
+            _ if q <= strength => (1.0, 0.0),
+            0.0 => (strength / q, 0.0),
+            slope => (1.0, 1.5 * (q - strength) / (slope * q)),
+        };
+        let change = |i: usize| (kept * relative[i] + back[i]) / (2.0 * mu) + flow * relative[i];
+        // Engineering shears are twice those of the tensor.
+        let strain = |i: usize| if i < 3 { volume + change(i) } else { 2.0 * change(i) };
+        std::array::from_fn(|i| strain(i) + committed.plastic_strain[i])
+    }
+
     /// (H + C) / (3 mu + H + C).
     fn least_tangent(&self) -> f64 {
         match self.yield_stress {

@@ -1,5 +1,7 @@
 //! The solution as fields on one rank's mesh: what ParaView shows.
 
+use std::ops::Range;
+
 use super::contact::{self, ContactState};
 use crate::assembly::internal;
 use crate::decomposition::Subdomain;
@@ -81,10 +83,11 @@ pub struct OfElements {
     pub sizes: Option<Vec<Vec<f64>>>,
 }
 
-/// The largest value of a field in each element of all increments that were recorded, subdomain by subdomain. None if there is no
+/// The largest value of a field in each element of some increments that were recorded, subdomain by subdomain. None if there is no
 /// such field.
-pub fn largest(piece: &Piece, subdomains: &[Subdomain], name: &str) -> Vec<Vec<f64>> {
-    let states = piece.cell_data.iter().filter(|field| field.name == name).flat_map(|field| &field.states);
+pub fn largest(piece: &Piece, increments: Range<usize>, subdomains: &[Subdomain], name: &str) -> Vec<Vec<f64>> {
+    let states =
+        piece.cell_data.iter().filter(|field| field.name == name).flat_map(|field| &field.states[increments.clone()]);
     let mut largest: Vec<f64> = Vec::new();
     for state in states.filter_map(Values::real) {
         largest.resize(state.len(), 0.0);

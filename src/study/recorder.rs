@@ -63,7 +63,8 @@ impl<'a> Recorder<'a> {
         // The potential is that of the step, so its distances are measured before the step is committed.
         let distances = self.scene.solver.error.map(|_| {
             let (problem, u) = (newton.problem(), &newton.iterate().u);
-            timer.time("error estimate", || bregman::distances(problem.sums, &problem.regions(), u))
+            let perfect = self.scene.has_limit_load();
+            timer.time("error estimate", || bregman::distances(problem.sums, &problem.regions(), u, perfect))
         });
         let (goal, mut sizes) = measured.unzip();
         if goal.is_none() && self.goal.is_some() {

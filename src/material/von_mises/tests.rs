@@ -330,3 +330,32 @@ fn no_stress_without_pressure_has_more_power_than_the_dissipation_and_that_of_fl
     let none = [VonMises { yield_stress: None, ..perfect }, VonMises { hardening: 1.0, ..perfect }];
     assert!(none.iter().all(|law| law.dissipation(&[1.0; 6]).is_none()));
 }
+
+/// A strain of a stress has this stress, and is the only one where the material hardens. Where it does not, stresses beyond the yield
+/// surface become such on it.
+#[test]
+fn strains_of_stresses_have_these_stresses() {
+    let near = |a: &Voigt, b: &Voigt| {
+        let [difference, size] = [&std::array::from_fn(|i| a[i] - b[i]), b].map(stress_norm);
+        assert!(difference <= 1e-9 * size, "{a:?} is not {b:?}");
+    };
+    for (material, strain, history) in states() {
+        let stress = material.respond(&strain, &history).stress;
+        let found = material.strain(&stress, &history);
+        near(&material.respond(&found, &history).stress, &stress);
+        let slope = material.hardening + material.kinematic_hardening;
+        if slope >= 10.0 {
+            near(&found, &strain);
+        }
+        let beyond = stress.map(|s| 5.0 * s);
+        let reached = material.respond(&material.strain(&beyond, &history), &history).stress;
+        if slope > 0.0 {
+            near(&reached, &beyond);
+        } else {
+            close(trace(&reached), trace(&beyond), 1e-9);
+            let kept = von_mises(&reached) / von_mises(&beyond);
+            near(&deviator(&reached), &deviator(&beyond).map(|s| kept * s));
+            assert!(kept <= 1.0 && von_mises(&reached) <= STEEL.yield_stress.unwrap() * (1.0 + 1e-12));
+        }
+    }
+}

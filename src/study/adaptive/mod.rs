@@ -11,6 +11,7 @@ pub mod start;
 mod tests;
 
 use std::collections::HashSet;
+use std::ops::Range;
 
 use super::cascade::{displacements, fetch};
 use super::{Solved, fields};
@@ -23,6 +24,7 @@ use crate::mesh::bisection::{Refinable, Round};
 use crate::mesh::form::Forms;
 use crate::model::Discrete;
 use crate::model::meshes::{MeshError, Meshes, mapped};
+use crate::record::summary::Summary;
 use crate::results::checkpoint::Checkpoint;
 use crate::results::piece::Field;
 use crate::scene::{self, ErrorOf, Scene};
@@ -143,9 +145,20 @@ impl Adaptive {
     }
 }
 
-/// What each element of each of this rank's subdomains has of the error: an energy, or a square; the largest of all increments.
-pub fn parts(discrete: &Discrete, solved: &Solved, of: &ErrorOf) -> Vec<Vec<f64>> {
-    let largest = |name| fields::largest(&solved.piece, &discrete.decomposition.subdomains, name);
+/// The increments that count for errors: all. Equilibria on the way to a limit load compare where they did the same work: at the end of
+/// the first mesh, which is where others begin.
+pub fn counting(summary: &Summary, is_first: bool) -> Range<usize> {
+    let all = summary.steps.len();
+    match summary.limit_load {
+        None => 0..all,
+        Some(_) if is_first => all - 1..all,
+        Some(_) => 0..1,
+    }
+}
+
+/// What each element of each of this rank's subdomains has of the error: an energy, or a square; the largest of some increments.
+pub fn parts(discrete: &Discrete, solved: &Solved, of: &ErrorOf, increments: Range<usize>) -> Vec<Vec<f64>> {
+    let largest = |name| fields::largest(&solved.piece, increments.clone(), &discrete.decomposition.subdomains, name);
     match of {
         ErrorOf::Energy => largest(fields::ENERGY_ERROR),
         ErrorOf::Goal(_) => largest(fields::GOAL_ERROR),
