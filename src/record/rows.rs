@@ -49,9 +49,14 @@ impl LimitLoad {
         (self.upper - self.lower) / self.upper.abs()
     }
 
+    /// From an equilibrium of this factor, whose residual may leave it above what the mechanism takes.
+    pub fn new(factor: f64, upper: f64, work: f64) -> Self {
+        Self { lower: factor.min(upper), upper, factor, work }
+    }
+
     /// With the higher lower bound of both, and the upper one of the later.
     pub fn then(self, later: Self) -> Self {
-        Self { lower: self.lower.max(later.lower), ..later }
+        Self { lower: self.lower.max(later.lower).min(later.upper), ..later }
     }
 }
 

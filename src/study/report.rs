@@ -55,7 +55,7 @@ pub(super) fn step_row(
         time: at.time(),
         halvings: at.halvings as u64,
         converged,
-        limit_load: bounds.map(|newton::Bounds { lower, upper, work }| LimitLoad { lower, upper, factor: lower, work }),
+        limit_load: bounds.map(|newton::Bounds { lower, upper, work }| LimitLoad::new(lower, upper, work)),
         goal: None,
         state: State { measures, ..state(scene, discrete, newton, contact, von_mises) },
     }

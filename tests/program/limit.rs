@@ -7,19 +7,33 @@ use serde_json::Value;
 const SPHERE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/limit/sphere.toml");
 const CYLINDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/limit/cylinder.toml");
 const STRIP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/limit/strip.toml");
+/// Less ground in larger cells, for what does not need the closed form.
+const SMALL: [&str; 3] = [
+    "body.ground.grid.x=[0, 12, 24, 34, 42, 47, 49, 50, 51, 53, 58, 66, 78, 95, 118, 150, 190, 250]",
+    "body.ground.grid.z=[-150, -115, -88, -68, -53, -41, -31, -23, -16, -10, -6, -3, -1, 0]",
+    "body.stamp.grid.x=[0, 12, 24, 34, 42, 47, 49, 50]",
+];
 
-/// Lower bound, upper bound and the factor of the last equilibrium; the lower one is below the upper one, as near as was wanted.
+/// The strip on little ground.
+fn small(ranks: usize, sets: &[&str]) -> Value {
+    solve(ranks, STRIP, &[&SMALL, sets].concat()).converged().summary()
+}
+
+/// Lower bound, upper bound and the factor of the last equilibrium, which is below the upper one but for its residual; the bounds are as
+/// near as was wanted.
 fn bounds(summary: &Value, tolerance: f64) -> [f64; 3] {
     let limit = &summary["limit_load"];
     let [lower, upper, factor] = ["lower", "upper", "factor"].map(|key| number(limit, key));
-    assert!(lower <= upper * (1.0 + 1e-3 * tolerance) && upper - lower <= tolerance * upper.abs(), "{limit}");
+    let residual = number(summary, "residual_equilibrium");
+    assert!(factor <= upper * (1.0 + residual), "{limit}, the residual is {residual}");
+    assert!(lower <= upper && upper - lower <= tolerance * upper.abs(), "{limit}");
     [lower, upper, factor]
 }
 
-/// Both bounds are within a hundredth of the closed form, in a tenth of the multiplications that approaching it took.
+/// Both bounds are within a hundredth of the closed form.
 #[test]
 fn closed_forms_are_between_bounds_or_near_them() {
-    for (scene, multiplications) in [(SPHERE, 300.0), (CYLINDER, 100.0), (STRIP, 256.0)] {
+    for (scene, multiplications) in [(SPHERE, 300.0), (CYLINDER, 100.0), (STRIP, 1250.0)] {
         let summary = solve(2, scene, &[]).converged().summary();
         let [lower, upper, _] = bounds(&summary, 0.01);
         assert!((lower - 1.0).abs() < 0.0102 && (upper - 1.0).abs() < 0.0102, "{scene}: {lower} to {upper}");
@@ -30,11 +44,11 @@ fn closed_forms_are_between_bounds_or_near_them() {
 #[test]
 fn bounds_are_the_same_bits_on_any_ranks() {
     let sets = ["decomposition.subdomains=6"];
-    let alone = solve(1, STRIP, &sets).converged();
+    let alone = small(1, &sets);
     for ranks in [2, 3] {
-        let run = solve(ranks, STRIP, &sets).converged();
+        let found = small(ranks, &sets);
         for key in ["limit_load", "energy", "hessian_multiplications", "steps"] {
-            assert_eq!(run.summary()[key], alone.summary()[key], "{key} on {ranks} ranks");
+            assert_eq!(found[key], alone[key], "{key} on {ranks} ranks");
         }
     }
 }
@@ -78,10 +92,10 @@ fn loads_that_stay_shift_the_limit_as_they_must() {
 #[test]
 fn the_limit_is_that_of_strength_alone() {
     let near = |sets: &[&str], wanted: f64| {
-        let found = bounds(&solve(2, STRIP, sets).converged().summary(), 0.01)[2];
+        let found = bounds(&small(2, sets), 0.01)[2];
         assert!((found / wanted - 1.0).abs() < 3e-3, "{sets:?}: {found} for {wanted}");
     };
-    let alone = bounds(&solve(2, STRIP, &["limit.tolerance=1e-4"]).converged().summary(), 1e-4)[2];
+    let alone = bounds(&small(2, &["limit.tolerance=1e-4"]), 1e-4)[2];
     near(&["material.ground.poisson=0.3"], alone);
     near(&["material.ground.poisson=0.499"], alone);
     near(&["material.ground.young=1e6", "material.stamp.young=1e12"], alone);
@@ -93,11 +107,19 @@ fn the_limit_is_that_of_strength_alone() {
     near(&[rested, "limit.loads=[\"stamp\"]"], alone);
 }
 
+/// Tangents are stiffer than what flows, and tell of steps that are too short. With these it took 56 of them.
+#[test]
+fn steps_along_a_mechanism_are_made_longer() {
+    let summary = small(2, &["material.stamp.young=1e5"]);
+    let lengths = summary["newton"].as_array().unwrap().iter().map(|row| number(row, "damping"));
+    assert!(lengths.reduce(f64::max).unwrap() > 1.0);
+    assert!(number(&summary, "newton_iterations") <= 48.0, "{}", summary["newton_iterations"]);
+}
+
 /// The weaker of two parts decides: a stamp that is squeezed between plane walls bears 2/sqrt(3) of its yield stress.
 #[test]
 fn the_weakest_part_decides() {
-    let sets = ["material.stamp.yield_stress=1000", "material.ground.yield_stress=1e9"];
-    let summary = solve(1, STRIP, &sets).converged().summary();
+    let summary = small(1, &["material.stamp.yield_stress=1000", "material.ground.yield_stress=1e9"]);
     assert!(number(&summary, "residual_energies") < 1e-3, "{}", summary["energies"]);
     let [lower, upper, _] = bounds(&summary, 0.01);
     let wanted = 2.0 / 3f64.sqrt() * 1000.0 / 2519.3551;
@@ -154,6 +176,9 @@ fn meshes_are_refined_to_a_limit() {
         let factors: Vec<f64> = rows.iter().map(|row| number(&row["limit_load"], "factor")).collect();
         assert!(rows.len() > 2 && factors.iter().all(|factor| *factor > 0.9999), "{factors:?}");
         let [lower, upper, factor] = bounds(&summary, 0.01);
+        // What is told belongs to the equilibrium whose factor stands beside it, not to later ones that do more work.
+        let over = number(&rows[rows.len() - 1], "error") / (factors[factors.len() - 1] - 1.0);
+        assert!((0.8..2.0).contains(&over), "{over} of the true error is told");
         assert!(factor < 1.005 && lower > 0.999 && upper < 1.012, "{lower} to {upper}");
     }
 }

@@ -8,7 +8,8 @@
 //! J(u_h) - J  ~  theta D_h + gap,   theta = (J(u_1) - J(u_2)) / (D_1 - D_2),
 //! ```
 //!
-//! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`, and `theta` is at least `LEAST`:
+//! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`, and `theta` is at least `LEAST`, or
+//! `LEAST_OF_LIMIT` where a limit load is sought:
 //! where bodies touch, conditions are those of a mesh, and energies need not fall. Where one rises, the error is taken to be as
 //! large at least. `gap` bounds what the solver left. Until there is such a mesh, `theta` is `UNKNOWN`. Energies of a history
 //! are those of its last increment, which begins from another state on each mesh: there `theta` stays so.
@@ -38,6 +39,8 @@ const APART: f64 = 2.0;
 /// The true factor was 0.46 on smooth solutions, whose strains are recovered well, up to 1.9 where fronts of plastic flow and
 /// edges are.
 const LEAST: f64 = 0.5;
+/// See [`LEAST`]; near limit loads it was 0.7 to 1.1 where two meshes told of 0.5 and less.
+const LEAST_OF_LIMIT: f64 = 1.0;
 /// Where nothing tells it.
 const UNKNOWN: f64 = 1.5;
 
@@ -122,7 +125,7 @@ fn factor(meshes: &[RefinementRow]) -> f64 {
     let tells = |coarse: &&RefinementRow| coarse.distance >= APART * fine.distance && compares(coarse, fine);
     let theta = |coarse: &RefinementRow| (coarse.energy - fine.energy) / (coarse.distance - fine.distance);
     let told = coarser.iter().rev().filter(tells).take(2).map(theta);
-    told.reduce(f64::max).unwrap_or(UNKNOWN).max(LEAST)
+    told.reduce(f64::max).unwrap_or(UNKNOWN).max(if fine.limit_load.is_some() { LEAST_OF_LIMIT } else { LEAST })
 }
 
 #[cfg(test)]
@@ -142,6 +145,11 @@ mod tests {
         let alone = estimate(&ErrorOf::Energy, &[coarse.clone(), fine.clone()]);
         assert_eq!(estimate(&ErrorOf::Energy, &[other.clone(), coarse, fine.clone()]), alone);
         assert_eq!(estimate(&ErrorOf::Energy, &[other, fine]), UNKNOWN * 1.0 / 8.0);
+        // Energies that fall less than distances tell less of a limit than of other loads.
+        let [coarse, fine] = [known(8.2, 3.0), known(8.0, 1.0)];
+        let with_limit = |known: &RefinementRow| RefinementRow { limit_load: limit(1.0), ..known.clone() };
+        assert_eq!(estimate(&ErrorOf::Energy, &[with_limit(&coarse), with_limit(&fine)]), LEAST_OF_LIMIT / 8.0);
+        assert_eq!(estimate(&ErrorOf::Energy, &[coarse, fine]), LEAST / 8.0);
     }
 
     #[test]
