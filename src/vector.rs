@@ -17,7 +17,7 @@ pub fn length(x: impl AsRef<[f64]>) -> f64 {
 
 /// `a - b`.
 #[inline]
-pub fn difference(a: Point, b: Point) -> Point {
+pub fn difference<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
     std::array::from_fn(|i| a[i] - b[i])
 }
 

@@ -1,5 +1,7 @@
 //! Solves a scene on finer and finer meshes until its error is small enough, or a limit is reached.
 
+use std::ops::Range;
+
 use super::levels::{Run, unfit};
 use super::plan::Plan;
 use super::room::make_room;
@@ -60,12 +62,8 @@ impl Run<'_> {
                 }
                 (found, _) => return found,
             };
-            plan.refinements.push(self.row(
-                (&discrete, &solved),
-                adaptive.unknowns(),
-                plan.refinements.is_empty(),
-                began,
-            ));
+            let increments = counting(&solved.summary, plan.refinements.is_empty());
+            plan.refinements.push(self.row((&discrete, &solved), &increments, adaptive.unknowns(), began));
             let row = with_error(plan, &scene.solver.error_of);
             monitor.event(&Event::Refinement { row: row.clone(), goal });
             if row.goal.is_some_and(|number| vanishes(&number)) {
@@ -80,7 +78,7 @@ impl Run<'_> {
             if error <= goal && (is_known || error * CLEARLY <= goal) {
                 return Ok((discrete, solved));
             }
-            let finer = || self.finer(scene, &adaptive, (&discrete, &solved), plan);
+            let finer = || self.finer(scene, &adaptive, (&discrete, &solved), &increments, plan);
             match self.timer.time("refinement of the mesh", finer) {
                 Ok(finer) => {
                     let tight;
@@ -143,12 +141,11 @@ impl Run<'_> {
     fn row(
         &self,
         (discrete, solved): (&Discrete, &Solved),
+        increments: &Range<usize>,
         unknowns: u64,
-        is_first: bool,
         began: f64,
     ) -> RefinementRow {
         let summary = &solved.summary;
-        let increments = counting(summary, is_first);
         let steps = &summary.steps[increments.clone()];
         let limit_load = steps.last().and_then(|row| row.limit_load);
         let of_limit = limit_load.map_or(0.0, |limit| limit.factor * limit.work);
@@ -190,6 +187,7 @@ impl Run<'_> {
         scene: &Scene,
         adaptive: &Adaptive,
         (discrete, solved): (&Discrete, &Solved),
+        increments: &Range<usize>,
         plan: &Plan,
     ) -> Result<(Adaptive, Meshes, Option<String>), String> {
         if plan.refinements.len() == MOST {
@@ -205,7 +203,6 @@ impl Run<'_> {
             // Its parts are squares.
             ErrorOf::Stress => share.max(SHARE.sqrt()).powi(2),
         };
-        let increments = counting(&solved.summary, plan.refinements.len() == 1);
         let parts = parts(discrete, solved, of, increments);
         let mut limit = String::new();
         for share in std::iter::once(share).chain(SMALLER.into_iter().filter(|&smaller| smaller > share)) {

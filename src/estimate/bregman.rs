@@ -31,8 +31,9 @@ use crate::assembly::visit::LAW;
 use crate::decomposition::Subdomain;
 use crate::decomposition::sums::NodeSums;
 use crate::feti::Torn;
-use crate::material::{History, Law};
+use crate::material::Law;
 use crate::tensor::Voigt;
+use crate::vector::difference;
 use crate::work;
 
 /// The distance (energy) in each element of each own subdomain. On all ranks it is `perfect` if some material of the scene flows without
@@ -40,45 +41,26 @@ use crate::work;
 pub fn distances(sums: &NodeSums, regions: &[Region], u: &Torn, perfect: bool) -> Vec<Vec<f64>> {
     let subdomains: Vec<&Subdomain> = regions.iter().map(|region| region.subdomain).collect();
     let strains = recovery::recover(sums, &subdomains, |own| stress::strains(&regions[own], &u[own]));
-    let of_strains = from(regions, u, &strains, |region, history, strain, recovered| {
-        region.material.divergence(&strain, &difference(&recovered, &strain), history)
-    });
-    if !perfect {
-        return of_strains;
-    }
-    let stresses = recovery::recover(sums, &subdomains, |own| stress::samples(&regions[own], &u[own]));
-    let of_stresses = from(regions, u, &stresses, |region, history, strain, recovered| {
-        let own = region.material.strain(&recovered, history);
-        region.material.divergence(&own, &difference(&strain, &own), history)
-    });
-    let smaller = |((region, strains), stresses): ((&Region, Vec<f64>), Vec<f64>)| match region.material.has_limit() {
-        true => strains.into_iter().zip(stresses).map(|(a, b)| a.min(b)).collect(),
-        false => strains,
-    };
-    regions.iter().zip(of_strains).zip(of_stresses).map(smaller).collect()
-}
-
-/// The integral over each element of a density, which is told of the history, the strain and what was recovered.
-fn from(
-    regions: &[Region],
-    u: &Torn,
-    recovered: &[Vec<Voigt>],
-    density: impl Fn(&Region, &History, Voigt, Voigt) -> f64,
-) -> Vec<Vec<f64>> {
-    let of = |((region, u), nodal): ((&Region, &Vec<f64>), &Vec<Voigt>)| {
+    let stresses = perfect.then(|| recovery::recover(sums, &subdomains, |own| stress::samples(&regions[own], &u[own])));
+    let of = |(own, (region, u)): (usize, (&Region, &Vec<f64>))| {
         let (elements, rule) = (&region.subdomain.elements, rule::squares(region.subdomain.elements.kind()));
         let points = elements.kind().points();
-        work::each(elements.len() * rule.len(), 12 * (elements.kind().nodes() + points) + 2 * LAW, 0);
+        let stresses = stresses.as_ref().filter(|_| region.material.has_limit()).map(|stresses| &stresses[own]);
+        let ways = 1 + usize::from(stresses.is_some());
+        work::each(elements.len() * rule.len(), ways * (12 * (elements.kind().nodes() + points) + 2 * LAW), 0);
         let samples = stress::strains(region, u);
         let distances = integrals(elements, &samples, &rule, |index, nodes, samples, place| {
+            let strain = between(samples, place);
             let history = region.committed(points * index + nearest(place));
-            [density(region, history, between(samples, place), interpolated(nodal, nodes, &place.nodes))]
+            let at = |nodal: &[Voigt]| interpolated(nodal, nodes, &place.nodes);
+            let of_strain = region.material.divergence(&strain, &difference(at(&strains[own]), strain), history);
+            let of_stress = stresses.map_or(of_strain, |stresses| {
+                let other = region.material.strain(&at(stresses), history);
+                region.material.divergence(&other, &difference(strain, other), history)
+            });
+            [of_strain, of_stress]
         });
-        distances.into_iter().flatten().collect()
+        distances.into_iter().map(|[of_strain, of_stress]| of_strain.min(of_stress)).collect()
     };
-    regions.iter().zip(u).zip(recovered).map(of).collect()
-}
-
-fn difference(a: &Voigt, b: &Voigt) -> Voigt {
-    std::array::from_fn(|i| a[i] - b[i])
+    regions.iter().zip(u).enumerate().map(of).collect()
 }

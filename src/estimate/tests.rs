@@ -8,11 +8,16 @@ use crate::material::{Material, VonMises};
 use crate::scene::Scene;
 use crate::tensor::apply;
 
-/// Estimated and true error of a subdomain that is the whole body.
-fn errors(whole: &Subdomain, u: Vec<f64>, exact: &dyn Fn([f64; 3]) -> Voigt) -> [f64; 2] {
+/// A subdomain that is the whole body has no neighbours.
+fn alone() -> Decomposition {
     let shares = Shares::new(vec![1]);
     let clusters = Clusters::new(shares.total(), &[]);
-    let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
+    Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() }
+}
+
+/// Estimated and true error of a subdomain that is the whole body.
+fn errors(whole: &Subdomain, u: Vec<f64>, exact: &dyn Fn([f64; 3]) -> Voigt) -> [f64; 2] {
+    let alone = alone();
     let region = Region::virgin(whole, &orders::MATERIAL);
     let c = orders::MATERIAL.hooke().tangent();
     let u = vec![u];
@@ -180,9 +185,7 @@ fn the_bregman_distance_of_an_elastic_body_is_half_of_the_squared_error() {
     for (kind, cells) in [(Kind::Tet4, 4), (Kind::Hex8, 4), (Kind::Tet10, 2)] {
         let sphere = sphere(kind, cells);
         let u: Vec<f64> = sphere.points.iter().flat_map(|&x| lame(x)).collect();
-        let shares = Shares::new(vec![1]);
-        let clusters = Clusters::new(shares.total(), &[]);
-        let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
+        let alone = alone();
         let (sums, region, u) = (NodeSums::new(&Solo, &alone), [Region::virgin(&sphere, &orders::MATERIAL)], vec![u]);
         let squares = &estimate(&sums, &region, &u).errors[0];
         let distances = &bregman::distances(&sums, &region, &u, true)[0];
@@ -221,9 +224,7 @@ fn elements_beside_what_flows_have_little_of_the_error() {
     let soft = VonMises { yield_stress: Some(1e-3), ..VonMises::elastic(1.0, 0.3) };
     let cube = orders::cube(Kind::Tet10, 4);
     let u: Torn = vec![cube.points.iter().flat_map(|x| [0.0, (-20.0 * x[0]).exp(), 0.0]).collect()];
-    let shares = Shares::new(vec![1]);
-    let clusters = Clusters::new(shares.total(), &[]);
-    let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
+    let alone = alone();
     let material = Material::VonMises(soft);
     let (sums, region) = (NodeSums::new(&Solo, &alone), [Region::virgin(&cube, &material)]);
     let [both, strains] = [true, false].map(|perfect| bregman::distances(&sums, &region, &u, perfect).concat());
@@ -246,9 +247,7 @@ fn weighted_errors_are_near_the_product_of_the_true_ones() {
     for (kind, cells) in [(Kind::Tet4, 6), (Kind::Tet10, 3), (Kind::Tet10, 6)] {
         let cube = orders::cube(kind, cells);
         let [u, z] = [of_u, of_z].map(|at| orders::displacement(&cube, |_| [0.0; 3], |x| lame(at(x))));
-        let shares = Shares::new(vec![1]);
-        let clusters = Clusters::new(shares.total(), &[]);
-        let alone = Decomposition { shares, clusters, subdomains: Vec::new(), interface: Vec::new() };
+        let alone = alone();
         let (sums, region) = (NodeSums::new(&Solo, &alone), [Region::virgin(&cube, &orders::MATERIAL)]);
         // a(e_u, e_z) is a quarter of the squares of sum and difference.
         let square = |sign: f64| {

@@ -119,20 +119,17 @@ impl Trial {
             relative,
             equivalent: q,
             energy: 0.5 * bulk * volume * volume + of_stress * of_stress / (6.0 * mu),
-            yield_stress: f64::INFINITY,
+            yield_stress: material.present_yield_stress(committed),
             excess: 0.0,
             step: 0.0,
             shrink: 1.0,
         };
-        if let Some(initial) = material.yield_stress {
-            trial.yield_stress = initial + material.hardening * committed.kappa;
-            if q > trial.yield_stress {
-                trial.excess = q - trial.yield_stress;
-                trial.step = trial.excess / material.plastic_modulus();
-                // Equals 1 - 3 mu step / q, without its cancellation.
-                let hardening = material.hardening + material.kinematic_hardening;
-                trial.shrink = (trial.yield_stress + hardening * trial.step) / q;
-            }
+        if q > trial.yield_stress {
+            trial.excess = q - trial.yield_stress;
+            trial.step = trial.excess / material.plastic_modulus();
+            // Equals 1 - 3 mu step / q, without its cancellation.
+            let hardening = material.hardening + material.kinematic_hardening;
+            trial.shrink = (trial.yield_stress + hardening * trial.step) / q;
         }
         trial
     }
@@ -151,6 +148,11 @@ impl VonMises {
     /// A material that never yields.
     pub const fn elastic(young: f64, poisson: f64) -> Self {
         Self { young, poisson, yield_stress: None, hardening: 0.0, kinematic_hardening: 0.0 }
+    }
+
+    /// Where what was committed flows on; infinite if nothing yields.
+    fn present_yield_stress(&self, committed: &PlasticState) -> f64 {
+        self.yield_stress.map_or(f64::INFINITY, |initial| initial + self.hardening * committed.kappa)
     }
 
     /// 3 mu + H + C: what the equivalent stress falls by, beyond the yield surface, for a unit of plastic strain.
@@ -306,7 +308,7 @@ impl Law for VonMises {
         let (volume, s, back) = (trace(stress) / (9.0 * bulk), deviator(stress), self.back_stress(committed));
         let relative: Voigt = std::array::from_fn(|i| s[i] - back[i]);
         let q = equivalent(&relative);
-        let strength = self.yield_stress.map_or(f64::INFINITY, |initial| initial + self.hardening * committed.kappa);
+        let strength = self.present_yield_stress(committed);
         let (kept, flow) = match self.hardening + self.kinematic_hardening {
             _ if q <= strength => (1.0, 0.0),
             0.0 => (strength / q, 0.0),

@@ -102,17 +102,7 @@ pub fn search(
     };
     let slack = cost.slack(&full.u);
     if lowers(&full, &slack) {
-        let mut best = full;
-        while 2.0 * best.length <= longest
-            && cost.slope(&best.state, &cost.slack(&best.u), du) < STEEP * first_slope.min(0.0)
-        {
-            let next = trial(2.0 * best.length);
-            if cost.of(&next.state, &cost.slack(&next.u)) >= cost.of(&best.state, &cost.slack(&best.u)) {
-                break;
-            }
-            best = next;
-        }
-        return Ok(best);
+        return Ok(lengthened(&cost, (full, slack), (du, first_slope.min(0.0), longest), trial));
     }
     // Illinois: the slope changes its sign between low and high, (length, slope) each.
     let mut low = (0.0, first_slope);
@@ -138,4 +128,22 @@ pub fn search(
         }
     }
     Err(Box::new(full))
+}
+
+/// The step doubled as long as its cost falls, more than [`STEEP`] times as fast as at first; with its slack.
+fn lengthened(
+    cost: &Cost,
+    (mut best, mut slack): (Damped, Vec<f64>),
+    (du, first_slope, longest): (&Torn, f64, f64),
+    trial: impl Fn(f64) -> Damped,
+) -> Damped {
+    while 2.0 * best.length <= longest && cost.slope(&best.state, &slack, du) < STEEP * first_slope {
+        let next = trial(2.0 * best.length);
+        let beyond = cost.slack(&next.u);
+        if cost.of(&next.state, &beyond) >= cost.of(&best.state, &slack) {
+            break;
+        }
+        (best, slack) = (next, beyond);
+    }
+    best
 }

@@ -1,6 +1,6 @@
 //! Fill-reducing ordering by METIS nested dissection of a graph whose nodes have some unknowns each.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use signal_hook::consts::SIGTERM;
 use signal_hook::low_level;
@@ -16,7 +16,6 @@ pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>), width: u32) -> Vec<u3
     let nodes = begins.len() - 1;
     let mut count = nodes as metis_sys::idx_t;
     let (mut forward, mut inverse) = (vec![0; nodes], vec![0; nodes]);
-    let _alone = alone();
     let ordered = || {
         // Safety: METIS reads the graph and writes `count` entries to each permutation; pointers and lengths agree.
         unsafe {
@@ -39,9 +38,12 @@ pub fn nested_dissection(adjacency: &(Vec<i32>, Vec<i32>), width: u32) -> Vec<u3
     forward.iter().flat_map(|&n| (0..width).map(move |a| width * n as u32 + a)).collect()
 }
 
-/// What METIS finds; once more if it ended with its general error. METIS takes SIGTERM for an error of its own while it works, so the
+/// What METIS finds, for one thread at a time; once more if it ended with its general error. METIS draws from the C library's one
+/// generator, so results would depend on what other threads do. It takes SIGTERM for an error of its own while it works, so the
 /// signal is sent on to who waits for it.
 pub(crate) fn undisturbed<T>(mut metis: impl FnMut() -> T, is_error: impl Fn(&T) -> bool) -> T {
+    static LOCK: Mutex<()> = Mutex::new(());
+    let _alone = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
     let found = metis();
     if !is_error(&found) {
         return found;
@@ -49,11 +51,4 @@ pub(crate) fn undisturbed<T>(mut metis: impl FnMut() -> T, is_error: impl Fn(&T)
     // Where no one waits for it this ends the process, as the signal would have done.
     drop(low_level::raise(SIGTERM));
     metis()
-}
-
-/// Lets one thread at a time into METIS, which draws from the C library's one generator: without it, results would depend
-/// on what other threads do.
-pub(crate) fn alone() -> MutexGuard<'static, ()> {
-    static LOCK: Mutex<()> = Mutex::new(());
-    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
 }

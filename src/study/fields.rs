@@ -85,7 +85,7 @@ pub struct OfElements {
 
 /// The largest value of a field in each element of some increments that were recorded, subdomain by subdomain. None if there is no
 /// such field.
-pub fn largest(piece: &Piece, increments: Range<usize>, subdomains: &[Subdomain], name: &str) -> Vec<Vec<f64>> {
+pub fn largest(piece: &Piece, increments: &Range<usize>, subdomains: &[Subdomain], name: &str) -> Vec<Vec<f64>> {
     let states =
         piece.cell_data.iter().filter(|field| field.name == name).flat_map(|field| &field.states[increments.clone()]);
     let mut largest: Vec<f64> = Vec::new();

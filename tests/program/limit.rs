@@ -30,7 +30,8 @@ fn bounds(summary: &Value, tolerance: f64) -> [f64; 3] {
     [lower, upper, factor]
 }
 
-/// Both bounds are within a hundredth of the closed form.
+/// Both bounds are within a hundredth of the closed form. On little ground, in large cells, the strip takes a tenth of the multiplications
+/// that approaching it took.
 #[test]
 fn closed_forms_are_between_bounds_or_near_them() {
     for (scene, multiplications) in [(SPHERE, 300.0), (CYLINDER, 100.0), (STRIP, 1250.0)] {
@@ -39,6 +40,7 @@ fn closed_forms_are_between_bounds_or_near_them() {
         assert!((lower - 1.0).abs() < 0.0102 && (upper - 1.0).abs() < 0.0102, "{scene}: {lower} to {upper}");
         assert!(number(&summary, "hessian_multiplications") <= multiplications, "{scene}");
     }
+    assert!(number(&small(2, &[]), "hessian_multiplications") <= 256.0);
 }
 
 #[test]

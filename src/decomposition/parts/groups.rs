@@ -7,7 +7,7 @@ use metis::option::{Contig, Seed};
 
 use crate::heap::exhausted;
 use crate::mesh::connectivity::split_into_pieces;
-use crate::sparse::ordering::{alone, undisturbed};
+use crate::sparse::ordering::undisturbed;
 
 /// Faces between two items, both ways and ascending.
 pub type Faces = BTreeMap<(u32, u32), u64>;
@@ -81,7 +81,6 @@ fn of_level(items: usize, faces: &Faces, size: usize) -> Vec<u32> {
 /// Group of each vertex of a graph, given by begins and neighbours, with little weight between the groups.
 fn kway((begin, adjacency): (&[i32], &[i32]), weights: &[i32], wanted: i32) -> Vec<i32> {
     let mut groups = vec![0; begin.len() - 1];
-    let _alone = alone();
     let cut = || {
         let graph = Graph::new(1, wanted, begin, adjacency).expect("the rows are in order").set_adjwgt(weights);
         graph.set_option(Contig(false)).set_option(Seed(1)).part_kway(&mut groups)

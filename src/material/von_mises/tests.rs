@@ -3,6 +3,7 @@ use crate::analytic::cycle::Cycle;
 use crate::material::samples::STEEL;
 use crate::random::Random;
 use crate::tensor::{apply, contract, deviator, stress_norm, von_mises};
+use crate::vector::difference;
 
 mod flow;
 
@@ -336,7 +337,7 @@ fn no_stress_without_pressure_has_more_power_than_the_dissipation_and_that_of_fl
 #[test]
 fn strains_of_stresses_have_these_stresses() {
     let near = |a: &Voigt, b: &Voigt| {
-        let [difference, size] = [&std::array::from_fn(|i| a[i] - b[i]), b].map(stress_norm);
+        let [difference, size] = [&difference(*a, *b), b].map(stress_norm);
         assert!(difference <= 1e-9 * size, "{a:?} is not {b:?}");
     };
     for (material, strain, history) in states() {

@@ -8,9 +8,8 @@
 //! J(u_h) - J  ~  theta D_h + gap,   theta = (J(u_1) - J(u_2)) / (D_1 - D_2),
 //! ```
 //!
-//! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`, and `theta` is at least `LEAST`, or
-//! `LEAST_OF_LIMIT` where a limit load is sought:
-//! where bodies touch, conditions are those of a mesh, and energies need not fall. Where one rises, the error is taken to be as
+//! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`, and `theta` is at least `LEAST`
+//! (`LEAST_OF_LIMIT` where a limit load is sought): where bodies touch, conditions are those of a mesh, and energies need not fall. Where one rises, the error is taken to be as
 //! large at least. `gap` bounds what the solver left. Until there is such a mesh, `theta` is `UNKNOWN`. Energies of a history
 //! are those of its last increment, which begins from another state on each mesh: there `theta` stays so.
 //!

@@ -157,8 +157,8 @@ pub fn counting(summary: &Summary, is_first: bool) -> Range<usize> {
 }
 
 /// What each element of each of this rank's subdomains has of the error: an energy, or a square; the largest of some increments.
-pub fn parts(discrete: &Discrete, solved: &Solved, of: &ErrorOf, increments: Range<usize>) -> Vec<Vec<f64>> {
-    let largest = |name| fields::largest(&solved.piece, increments.clone(), &discrete.decomposition.subdomains, name);
+pub fn parts(discrete: &Discrete, solved: &Solved, of: &ErrorOf, increments: &Range<usize>) -> Vec<Vec<f64>> {
+    let largest = |name| fields::largest(&solved.piece, increments, &discrete.decomposition.subdomains, name);
     match of {
         ErrorOf::Energy => largest(fields::ENERGY_ERROR),
         ErrorOf::Goal(_) => largest(fields::GOAL_ERROR),
