@@ -18,17 +18,12 @@ use crate::restart::checkpoint::Unfit;
 use crate::results::checkpoint::Checkpoint;
 use crate::scene::{ErrorOf, Scene};
 use crate::sizing::counts::Counted;
+use crate::study::adaptive::aim::shares;
 use crate::study::adaptive::error::{estimate, is_history, is_known, vanishes};
 use crate::study::adaptive::start::{Start, start};
 use crate::study::adaptive::{Adaptive, counting, marking, parts};
 use crate::study::{Begin, Solved};
 
-/// A mesh aims at this share of the error of the one before at least: further off the estimate is not to be trusted ...
-const SHARE: f64 = 0.4;
-/// ... and at this share of the wanted error: less is left than was foretold.
-const AIM: f64 = 0.85;
-/// Where that is too large a mesh, these shares are tried.
-const SMALLER: [f64; 3] = [0.6, 0.75, 0.9];
 /// Meshes at most.
 const MOST: usize = 40;
 /// The first mesh is enough if its error is so many times smaller than wanted: nothing was compared yet.
@@ -193,19 +188,10 @@ impl Run<'_> {
         if plan.refinements.len() == MOST {
             return Err(format!("{MOST} meshes did not reach it"));
         }
-        let row = plan.refinements.last().expect("a mesh was solved on");
-        let share = scene.solver.error.map_or(1.0, |goal| AIM * goal / row.error).clamp(SHARE, SMALLER[2]);
         let of = &scene.solver.error_of;
-        let share = match of {
-            // Nearly the same mesh would not tell more.
-            ErrorOf::Goal(_) if !is_known(of, &plan.refinements) => SHARE,
-            ErrorOf::Energy | ErrorOf::Goal(_) => share,
-            // Its parts are squares.
-            ErrorOf::Stress => share.max(SHARE.sqrt()).powi(2),
-        };
         let parts = parts(discrete, solved, of, increments);
         let mut limit = String::new();
-        for share in std::iter::once(share).chain(SMALLER.into_iter().filter(|&smaller| smaller > share)) {
+        for share in shares(of, scene.solver.error.unwrap_or_default(), &plan.refinements) {
             let mut finer = adaptive.clone();
             finer.refine(self.comm, (discrete, &solved.u), marking::wanted(self.comm, discrete, &parts, share));
             if finer.unknowns() == adaptive.unknowns() {

@@ -1,9 +1,11 @@
 //! Meshes as fine as an error asks for.
 //!
-//! A scene begins on few elements ([`start`]). When it is solved there, the [`error`] is estimated; [`marking`] names the
-//! elements that have most of it, these are bisected ([`crate::mesh::bisection`]), and the displacement passes to the finer
-//! meshes. What was bisected is kept: a run that goes on makes the same meshes from the first ones again.
+//! A scene begins on few elements ([`start`]). When it is solved there, the [`error`] is estimated; [`aim`] says how much of it
+//! the next mesh is to leave, and [`marking`] names the elements that have most of it. These are bisected
+//! ([`crate::mesh::bisection`]), and the displacement passes to the finer meshes. What was bisected is kept: a run that goes on
+//! makes the same meshes from the first ones again.
 
+pub mod aim;
 pub mod error;
 pub mod marking;
 pub mod start;
