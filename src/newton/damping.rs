@@ -23,35 +23,6 @@ const ROUNDING: f64 = 1e-15;
 /// Evaluations of `J` before the direction is given up.
 const TRIALS: usize = 30;
 
-/// What is minimised: `J`, and what friction with these radii dissipates.
-struct Cost<'p, 'a> {
-    problem: &'p TornProblem<'a>,
-    radii: &'p Radii,
-}
-
-impl Cost<'_, '_> {
-    /// The slack of a displacement; nothing without friction, where nobody asks for it.
-    fn slack(&self, u: &Torn) -> Vec<f64> {
-        if self.problem.constraints.has_friction { self.problem.slack(u) } else { Vec::new() }
-    }
-
-    /// At a displacement with this slack.
-    fn of(&self, state: &State, slack: &[f64]) -> f64 {
-        state.energy + self.problem.dissipation(self.radii, slack)
-    }
-
-    /// Its slope there along `du`.
-    fn slope(&self, state: &State, slack: &[f64], du: &Torn) -> f64 {
-        let slope = self.problem.slope(state, du);
-        if !self.problem.constraints.has_friction {
-            return slope;
-        }
-        let mut change = vec![0.0; self.problem.gather.rows()];
-        self.problem.gather.apply(du, &mut change);
-        slope + self.problem.dissipation_slope(self.radii, slack, &change)
-    }
-}
-
 /// The accepted step.
 pub struct Damped {
     /// The new displacement, admissible.
@@ -74,76 +45,121 @@ pub fn search(
     admissible: bool,
     timer: &Timer,
 ) -> Result<Damped, Box<Damped>> {
-    let cost = Cost { problem, radii };
-    let trial = |length: f64| {
-        timer.time("internal forces", || {
-            let mut v = u.clone();
-            for (v, d) in v.iter_mut().zip(du) {
-                v.iter_mut().zip(d).for_each(|(v, d)| *v += length * d);
-            }
-            problem.make_admissible(&mut v);
-            let state = problem.evaluate(&v);
-            Damped { u: v, state, length }
-        })
-    };
-    let full = trial(1.0);
+    let line = Line { problem, radii, u, du, timer };
+    let full = line.at(1.0);
     if !admissible {
-        return Ok(full);
+        return Ok(full.step);
     }
-    let slack = cost.slack(u);
-    let (first_slope, before) = (cost.slope(state, &slack, du), cost.of(state, &slack));
-    // Round-off in the difference of two energies.
-    let cancelled = ROUNDING * full.state.terms.energy.sqrt();
-    let noise = 1e-12
-        * (state.internal_energy.abs() + full.state.internal_energy.abs() + full.state.external_work.abs())
-        + cancelled * (cancelled + 2.0 * state.internal_energy.abs().sqrt());
-    let lowers = |t: &Damped, slack: &[f64]| {
-        cost.of(&t.state, slack) <= before + SUFFICIENT * t.length * first_slope.min(0.0) + noise
-    };
-    let slack = cost.slack(&full.u);
-    if lowers(&full, &slack) {
-        return Ok(lengthened(&cost, (full, slack), (du, first_slope.min(0.0), longest), trial));
+    let slack = line.slack(u);
+    let (before, first_slope) = (line.cost(state, &slack), line.slope(state, &slack));
+    let noise = noise(state, &full.step.state);
+    let lowers = |point: &Point| point.cost <= before + SUFFICIENT * point.step.length * first_slope.min(0.0) + noise;
+    if lowers(&full) {
+        Ok(line.lengthened(full, first_slope.min(0.0), longest))
+    } else {
+        line.shortened(full, first_slope, lowers)
     }
-    // Illinois: the slope changes its sign between low and high, (length, slope) each.
-    let mut low = (0.0, first_slope);
-    let mut high = (1.0, cost.slope(&full.state, &slack, du));
-    for _ in 0..TRIALS {
-        let inside = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
-        let length = if inside > low.0 && inside < high.0 { inside } else { 0.5 * (low.0 + high.0) };
-        let next = trial(length);
-        let slack = cost.slack(&next.u);
-        let slope = cost.slope(&next.state, &slack, du);
-        if lowers(&next, &slack) && slope.abs() <= FLAT * first_slope.abs() {
-            return Ok(next);
-        }
-        if slope.is_nan() {
-            return Err(Box::new(full));
-        }
-        if slope < 0.0 {
-            low = (length, slope);
-            high.1 *= 0.5;
-        } else {
-            high = (length, slope);
-            low.1 *= 0.5;
-        }
-    }
-    Err(Box::new(full))
 }
 
-/// The step doubled as long as its cost falls, more than [`STEEP`] times as fast as at first; with its slack.
-fn lengthened(
-    cost: &Cost,
-    (mut best, mut slack): (Damped, Vec<f64>),
-    (du, first_slope, longest): (&Torn, f64, f64),
-    trial: impl Fn(f64) -> Damped,
-) -> Damped {
-    while 2.0 * best.length <= longest && cost.slope(&best.state, &slack, du) < STEEP * first_slope {
-        let next = trial(2.0 * best.length);
-        let beyond = cost.slack(&next.u);
-        if cost.of(&next.state, &beyond) >= cost.of(&best.state, &slack) {
-            break;
-        }
-        (best, slack) = (next, beyond);
+/// Round-off in the difference of two energies.
+fn noise(one: &State, other: &State) -> f64 {
+    let cancelled = ROUNDING * other.terms.energy.sqrt();
+    1e-12 * (one.internal_energy.abs() + other.internal_energy.abs() + one.external_work.abs())
+        + cancelled * (cancelled + 2.0 * one.internal_energy.abs().sqrt())
+}
+
+/// The line `u + t du`, and what is minimised on it: `J`, and what friction with these radii dissipates.
+struct Line<'s, 'a> {
+    problem: &'s TornProblem<'a>,
+    radii: &'s Radii,
+    u: &'s Torn,
+    du: &'s Torn,
+    timer: &'s Timer,
+}
+
+/// A point of it.
+struct Point {
+    step: Damped,
+    slack: Vec<f64>,
+    cost: f64,
+}
+
+impl Line<'_, '_> {
+    /// The point of this length. Collective.
+    fn at(&self, length: f64) -> Point {
+        let step = self.timer.time("internal forces", || {
+            let mut u = self.u.clone();
+            for (u, du) in u.iter_mut().flatten().zip(self.du.iter().flatten()) {
+                *u += length * du;
+            }
+            self.problem.make_admissible(&mut u);
+            let state = self.problem.evaluate(&u);
+            Damped { u, state, length }
+        });
+        let slack = self.slack(&step.u);
+        Point { cost: self.cost(&step.state, &slack), step, slack }
     }
-    best
+
+    /// The slack of a displacement; nothing without friction, where nobody asks for it.
+    fn slack(&self, u: &Torn) -> Vec<f64> {
+        if self.problem.constraints.has_friction { self.problem.slack(u) } else { Vec::new() }
+    }
+
+    fn cost(&self, state: &State, slack: &[f64]) -> f64 {
+        state.energy + self.problem.dissipation(self.radii, slack)
+    }
+
+    /// Derivative of the cost by the length.
+    fn slope(&self, state: &State, slack: &[f64]) -> f64 {
+        let slope = self.problem.slope(state, self.du);
+        if !self.problem.constraints.has_friction {
+            return slope;
+        }
+        let mut change = vec![0.0; self.problem.gather.rows()];
+        self.problem.gather.apply(self.du, &mut change);
+        slope + self.problem.dissipation_slope(self.radii, slack, &change)
+    }
+
+    /// The step doubled as long as its cost falls, more than [`STEEP`] times as fast as at first.
+    fn lengthened(&self, mut best: Point, first_slope: f64, longest: f64) -> Damped {
+        while 2.0 * best.step.length <= longest && self.slope(&best.step.state, &best.slack) < STEEP * first_slope {
+            let next = self.at(2.0 * best.step.length);
+            if next.cost >= best.cost {
+                break;
+            }
+            best = next;
+        }
+        best.step
+    }
+
+    /// A shorter step than the full one, where the cost is flat: regula falsi, Illinois variant.
+    fn shortened(
+        &self,
+        Point { step: full, slack, .. }: Point,
+        first_slope: f64,
+        lowers: impl Fn(&Point) -> bool,
+    ) -> Result<Damped, Box<Damped>> {
+        // Length and slope, which changes its sign between low and high.
+        let (mut low, mut high) = ((0.0, first_slope), (1.0, self.slope(&full.state, &slack)));
+        for _ in 0..TRIALS {
+            let inside = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
+            let length = if inside > low.0 && inside < high.0 { inside } else { 0.5 * (low.0 + high.0) };
+            let next = self.at(length);
+            let slope = self.slope(&next.step.state, &next.slack);
+            if lowers(&next) && slope.abs() <= FLAT * first_slope.abs() {
+                return Ok(next.step);
+            }
+            if slope.is_nan() {
+                break;
+            }
+            if slope < 0.0 {
+                low = (length, slope);
+                high.1 *= 0.5;
+            } else {
+                high = (length, slope);
+                low.1 *= 0.5;
+            }
+        }
+        Err(Box::new(full))
+    }
 }

@@ -181,7 +181,7 @@ impl<'a> StepSolver<'a> {
         problem: &TornProblem,
         (u, state): (&Torn, &State),
         last: &[f64],
-        (forcing, goes_on): (Forcing, bool),
+        (mut forcing, goes_on): (Forcing, bool),
         timer: &Timer,
         alive: &dyn Fn(usize),
     ) -> Result<Step, String> {
@@ -196,23 +196,10 @@ impl<'a> StepSolver<'a> {
         let (mut forces, mut open) = (problem.unbalance(state), slack.clone());
         let lifted = self.operator.lift(problem.constraints, &mut forces, &mut open);
 
-        if problem.constraints.has_friction {
-            let discs = self.discs(problem);
-            timer.time("coarse set-up", || self.programs.slide(&self.coarse, discs, last, &open));
-        }
-
-        // lambda (14), from multipliers with G lambda = e and the residual d - F lambda there.
-        let (resultants, lambda) = timer.time("coarse problem", || {
-            let e = recover::resultants(problem.subdomains, problem.modes, &self.coarse, &forces);
-            let lambda = self.programs.start(&self.coarse, last, &e);
-            (e, lambda)
-        });
-        let mut residual = vec![0.0; slack.len()];
-        self.respond(&lambda, &mut forces.clone(), &mut residual, timer);
-        residual.iter_mut().zip(&open).for_each(|(r, c)| *r -= c);
-        let (mut from, mut forcing) = (Rest::new(lambda, residual), forcing);
+        // From multipliers with G lambda = e to lambda (14).
+        let (resultants, mut from) = self.start(problem, (&forces, &open), last, timer);
         let (mut statistics, mut is_exact) = (Statistics::default(), false);
-        let (found, at_floor, recovered, rest) = loop {
+        let (found, at_floor, mut recovered, rest) = loop {
             let dual = Dual {
                 operator: &mut self.operator,
                 coarse: &self.coarse,
@@ -242,7 +229,6 @@ impl<'a> StepSolver<'a> {
                 rest => break (found, at_floor, recovered, rest),
             }
         };
-        let mut recovered = recovered;
 
         // What the tolerance of the program left open is closed.
         if let (Some(preconditioner), Some(face)) = (&mut self.preconditioner, self.programs.face()) {
@@ -265,6 +251,30 @@ impl<'a> StepSolver<'a> {
             factorisations,
             directions,
         })
+    }
+
+    /// Where the program (14) starts: `e`, multipliers with `G lambda = e` near the `last` ones, and the residual `d - F lambda` there.
+    /// Collective.
+    fn start(
+        &mut self,
+        problem: &TornProblem,
+        (forces, open): (&Torn, &[f64]),
+        last: &[f64],
+        timer: &Timer,
+    ) -> (Vec<f64>, Rest) {
+        if problem.constraints.has_friction {
+            let discs = self.discs(problem);
+            timer.time("coarse set-up", || self.programs.slide(&self.coarse, discs, last, open));
+        }
+        let (resultants, lambda) = timer.time("coarse problem", || {
+            let e = recover::resultants(problem.subdomains, problem.modes, &self.coarse, forces);
+            let lambda = self.programs.start(&self.coarse, last, &e);
+            (e, lambda)
+        });
+        let mut residual = vec![0.0; open.len()];
+        self.respond(&lambda, &mut forces.clone(), &mut residual, timer);
+        residual.iter_mut().zip(open).for_each(|(r, c)| *r -= c);
+        (resultants, Rest::new(lambda, residual))
     }
 
     /// Assembles the tangents at `u` and factorises those that changed by more than `left`; the preconditioner follows. Returns

@@ -53,7 +53,7 @@ fn power(of: &ErrorOf, goal: f64, meshes: &[RefinementRow]) -> f64 {
     (1..meshes.len()).fold(1.0, |power, mesh| {
         let left = parts(of, &meshes[mesh]) / parts(of, &meshes[mesh - 1]);
         let told = left.ln() / marked(of, goal, &meshes[..mesh], power).ln();
-        told.max(POWERS[0]).min(POWERS[1])
+        if told.is_nan() { power } else { told.clamp(POWERS[0], POWERS[1]) }
     })
 }
 
