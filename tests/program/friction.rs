@@ -279,7 +279,11 @@ fn friction_costs_few_more_applications_of_the_dual_operator() {
 /// SMALSE-M alone finds the same, and takes few times the applications of F of the active set.
 #[test]
 fn the_safeguard_takes_four_times_the_applications_at_most() {
-    const FINE: [&str; 2] = ["body.lower.brick.cells=[45, 15, 15]", "body.upper.brick.cells=[45, 15, 15]"];
+    const FINE: [&str; 3] = [
+        "body.lower.brick.cells=[45, 15, 15]",
+        "body.upper.brick.cells=[45, 15, 15]",
+        "decomposition.cells=[15, 15, 15]",
+    ];
     let cases = ["friction=0.0", "friction=0.3", "friction=0.8", "shear_limit=10.0"].map(|law| (law, &[][..]));
     for (law, cells) in cases.into_iter().chain([("shear_limit=10.0", &FINE[..])]) {
         let law = format!("contact.joint.{law}");
