@@ -10,9 +10,9 @@
 //!
 //! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`. Until there is such a mesh, `theta` is
 //! `UNKNOWN`. Then it is at least `LEAST`: where bodies touch, conditions are those of a mesh, and energies need not fall. Where a limit
-//! load is sought, it is at least `UNKNOWN`: distances are far too large on coarse meshes there, and much of them can vanish with little
-//! of the error. Where an energy rises, the error is taken to be as large at least. `gap` bounds what the solver left. Energies of a
-//! history are those of its last increment, which begins from another state on each mesh: there `theta` stays `UNKNOWN`.
+//! load is sought, it is at least `LEAST_OF_LIMIT`: distances are far too large on coarse meshes there, and much of them can vanish with
+//! little of the error. Where an energy rises, the error is taken to be as large at least. `gap` bounds what the solver left. Energies of a
+//! history are those of its last increment, which begins from another state on each mesh: there `theta` is `OF_HISTORY`.
 //!
 //! Of the stress: the estimate of `estimate`, by `SAFETY` larger.
 //!
@@ -39,8 +39,12 @@ const APART: f64 = 2.0;
 /// The true factor was 0.46 on smooth solutions, whose strains are recovered well, up to 1.9 where fronts of plastic flow and
 /// edges are.
 const LEAST: f64 = 0.5;
-/// Where nothing tells it. It was 0.7 to 2.3 near limit loads.
-const UNKNOWN: f64 = 1.5;
+/// See [`LEAST`]; near limit loads it was 0.7 to 2.3.
+const LEAST_OF_LIMIT: f64 = 1.5;
+/// Where nothing tells it, the largest one.
+const UNKNOWN: f64 = 2.0;
+/// Of histories, in which each element counts with the largest distance of all increments.
+const OF_HISTORY: f64 = 1.5;
 
 /// Errors of numbers were up to 1.8 times what elements add up to on meshes that resolve the solution.
 const SAFETY_OF_SUM: f64 = 1.5;
@@ -58,7 +62,7 @@ pub fn estimate(of: &ErrorOf, meshes: &[RefinementRow]) -> f64 {
         ErrorOf::Goal(_) => of_goal(meshes),
         ErrorOf::Stress => SAFETY * last.stress,
         ErrorOf::Energy => {
-            let (theta, least) = if is_history(meshes) { (UNKNOWN, 0.0) } else { (factor(meshes), rise(meshes)) };
+            let (theta, least) = if is_history(meshes) { (OF_HISTORY, 0.0) } else { (factor(meshes), rise(meshes)) };
             let above = (theta * last.distance + last.gap).max(least);
             if above == 0.0 { 0.0 } else { above / last.size }
         }
@@ -123,7 +127,7 @@ fn factor(meshes: &[RefinementRow]) -> f64 {
     let tells = |coarse: &&RefinementRow| coarse.distance >= APART * fine.distance && compares(coarse, fine);
     let theta = |coarse: &RefinementRow| (coarse.energy - fine.energy) / (coarse.distance - fine.distance);
     let told = coarser.iter().rev().filter(tells).take(2).map(theta);
-    told.reduce(f64::max).unwrap_or(UNKNOWN).max(if fine.limit_load.is_some() { UNKNOWN } else { LEAST })
+    told.reduce(f64::max).unwrap_or(UNKNOWN).max(if fine.limit_load.is_some() { LEAST_OF_LIMIT } else { LEAST })
 }
 
 #[cfg(test)]
@@ -147,7 +151,7 @@ mod tests {
         // Energies that fall less than distances tell less of a limit than of other loads.
         let [coarse, fine] = [known(8.2, 3.0), known(8.0, 1.0)];
         let with_limit = |known: &RefinementRow| RefinementRow { limit_load: limit(1.0), ..known.clone() };
-        assert_eq!(estimate(&ErrorOf::Energy, &[with_limit(&coarse), with_limit(&fine)]), UNKNOWN / 8.0);
+        assert_eq!(estimate(&ErrorOf::Energy, &[with_limit(&coarse), with_limit(&fine)]), LEAST_OF_LIMIT / 8.0);
         assert_eq!(estimate(&ErrorOf::Energy, &[coarse, fine]), LEAST / 8.0);
     }
 
@@ -207,7 +211,7 @@ mod tests {
         assert_eq!(error(&[known(0.0, 9.0), known(-7.0, 4.0), known(-7.0, 4.0), known(-9.5, 1.0)]), 2.5 / 3.0 / 9.5);
         assert_eq!(error(&[known(-7.0, 4.0), known(-6.9, 1.0)]), LEAST / 6.9);
         let history = meshes.map(|row| RefinementRow { increments: 2, ..row });
-        assert_eq!(error(&history), UNKNOWN / 9.5);
+        assert_eq!(error(&history), OF_HISTORY / 9.5);
         assert_eq!(error(&[RefinementRow { gap: 0.5, ..known(-5.0, 1.0) }]), (UNKNOWN + 0.5) / 5.0);
         assert_eq!(error(&[known(0.0, 0.0)]), 0.0);
         // What rises cannot be known better than that.
