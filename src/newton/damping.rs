@@ -33,8 +33,8 @@ pub struct Damped {
     pub length: f64,
 }
 
-/// Searches from `u` along `du`, with these radii of friction, for a length up to the `longest`, which is at least 1. Where `u` is not `admissible` the energies cannot be compared and the
-/// full step is taken.
+/// Searches from `u` along `du`, with these radii of friction, for a length up to the `longest`, which is at least 1. Where `u` is not
+/// `admissible` the energies cannot be compared and the full step is taken.
 ///
 /// # Errors
 /// The full step if no length lowers the energy.

@@ -149,10 +149,9 @@ mod tests {
         assert_eq!(estimate(&ErrorOf::Energy, &[other.clone(), coarse, fine.clone()]), alone);
         assert_eq!(estimate(&ErrorOf::Energy, &[other, fine]), UNKNOWN * 1.0 / 8.0);
         // Energies that fall less than distances tell less of a limit than of other loads.
-        let [coarse, fine] = [known(8.2, 3.0), known(8.0, 1.0)];
-        let with_limit = |known: &RefinementRow| RefinementRow { limit_load: limit(1.0), ..known.clone() };
-        assert_eq!(estimate(&ErrorOf::Energy, &[with_limit(&coarse), with_limit(&fine)]), LEAST_OF_LIMIT / 8.0);
-        assert_eq!(estimate(&ErrorOf::Energy, &[coarse, fine]), LEAST / 8.0);
+        let of_limit = [row(8.2, 3.0, 1.0), row(8.0, 1.0, 1.0)];
+        assert_eq!(estimate(&ErrorOf::Energy, &of_limit), LEAST_OF_LIMIT / 8.0);
+        assert_eq!(estimate(&ErrorOf::Energy, &[known(8.2, 3.0), known(8.0, 1.0)]), LEAST / 8.0);
     }
 
     #[test]
