@@ -16,21 +16,15 @@ pub(super) type Side<'a> = (&'a InterfaceNode, [Option<usize>; 3]);
 /// Rows with a cosine above this are parallel.
 const PARALLEL: f64 = 1.0 - 1e-12;
 
-/// Nodes of a pair and their factors in its condition.
-pub(super) fn nodes(pair: &ContactPair) -> impl Iterator<Item = (u64, f64)> {
-    let masters = pair.masters.iter().map(|(node, weight)| (*node, -weight));
-    pair.slaves.iter().copied().chain(masters)
-}
-
 /// The row of pair `number`; `sides` gives its nodes by their global number.
 ///
 /// # Errors
 /// If supports fix all nodes along the normal: what they fix.
 pub(super) fn row<'a>(number: usize, pair: &ContactPair, sides: &impl Fn(u64) -> Side<'a>) -> Result<Row, Vec<Fixed>> {
-    row_along(pair.normal, Kind::Contact { pair: number }, pair, sides)
+    row_of(Kind::Contact { pair: number }, pair.factors(), sides)
 }
 
-/// The row of a pair along a unit `direction`; see [`row`].
+/// The row of a pair along a unit `direction` of its plane; see [`row`].
 ///
 /// # Errors
 /// If supports fix all nodes along it: what they fix.
@@ -40,18 +34,27 @@ pub(super) fn row_along<'a>(
     pair: &ContactPair,
     sides: &impl Fn(u64) -> Side<'a>,
 ) -> Result<Row, Vec<Fixed>> {
+    row_of(kind, pair.nodes().map(|(node, factor)| (node, direction.map(|d| factor * d))), sides)
+}
+
+/// The row with these factors of nodes.
+fn row_of<'a>(
+    kind: Kind,
+    factors: impl Iterator<Item = (u64, [f64; 3])>,
+    sides: &impl Fn(u64) -> Side<'a>,
+) -> Result<Row, Vec<Fixed>> {
     let (mut terms, mut fixed) = (Vec::new(), Vec::new());
     let mut square = 0.0;
-    for (node, factor) in nodes(pair) {
+    for (node, factors) in factors {
         let (node, supports) = sides(node);
-        let weight = factor / node.copies.len() as f64;
-        for (axis, (component, support)) in direction.into_iter().zip(supports).enumerate() {
+        let copies = node.copies.len() as f64;
+        for (axis, (factor, support)) in factors.into_iter().zip(supports).enumerate() {
             match support {
-                Some(support) => fixed.push(Fixed { support, axis, weight: factor * component }),
-                None if component == 0.0 => {}
+                Some(support) => fixed.push(Fixed { support, axis, weight: factor }),
+                None if factor == 0.0 => {}
                 None => {
-                    square += component * component * factor * factor / node.copies.len() as f64;
-                    let term = |&subdomain| Term { subdomain, node: node.node, axis, value: weight * component };
+                    square += factor * factor / copies;
+                    let term = |&subdomain| Term { subdomain, node: node.node, axis, value: factor / copies };
                     terms.extend(node.copies.iter().map(term));
                 }
             }

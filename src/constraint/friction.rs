@@ -8,7 +8,7 @@
 //! scale, so that a disc of forces is a disc of multipliers. Where a node has several conditions (edges, corners) only directions
 //! have rows that are independent of all its normals: others would be held twice.
 
-use super::contact::{Side, nodes, row_along};
+use super::contact::{Side, row_along};
 use super::prescribed::Prescribed;
 use super::{Constraints, Fixed, Kind, Row};
 use crate::contact::ContactPair;
@@ -127,7 +127,7 @@ pub(super) fn guided<'a>(number: usize, pair: &ContactPair, sides: &impl Fn(u64)
         let supports = sides(node).1;
         axes().filter_map(move |axis| Some(Fixed { support: supports[axis]?, axis, weight }))
     };
-    let fixed = nodes(pair).flat_map(of_node).collect();
+    let fixed = pair.nodes().flat_map(of_node).collect();
     held.contains(&true).then_some(Guided { pair: number, normal: pair.normal, held, fixed })
 }
 

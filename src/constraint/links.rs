@@ -8,7 +8,6 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::components::Components;
-use super::contact;
 use super::ties::Ties;
 use crate::comm::meeting::{ask, home};
 use crate::comm::{Comm, maximum, sums};
@@ -106,7 +105,7 @@ impl Linked {
 
 /// Nodes that a pair ties together.
 pub(super) fn nodes_of(pair: &ContactPair) -> impl Iterator<Item = u64> {
-    contact::nodes(pair).map(|(node, _)| node)
+    pair.nodes().map(|(node, _)| node)
 }
 
 /// Components of nodes that what is known here ties together.

@@ -114,7 +114,7 @@ fn a_common_motion_leaves_gluing_at_rest_and_is_seen_by_supports_and_contact() {
                             let free = row.terms.iter().any(|t| (t.node, t.axis) == (node, axis));
                             if free { along[axis] * motion(point(setup, node))[axis] } else { 0.0 }
                         };
-                        let sides = |a: usize| contact::nodes(pair).map(|(node, w)| w * part(node, a)).sum::<f64>();
+                        let sides = |a: usize| pair.nodes().map(|(node, w)| w * part(node, a)).sum::<f64>();
                         row.scale * (0..3).map(sides).sum::<f64>()
                     }
                 };
@@ -195,6 +195,7 @@ fn pair(slaves: &[(u64, f64)], masters: &[(u64, f64)]) -> ContactPair {
         part: 0,
         slaves,
         masters,
+        vectors: Vec::new(),
         normal,
         gap: 0.5,
         area: 1.0,

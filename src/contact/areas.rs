@@ -1,18 +1,27 @@
 //! Normals of the nodes of a surface, and the areas that belong to them.
 
-use super::quadratic;
 use super::surface::GatheredSurface;
+use super::{quadratic, smooth};
+use crate::mesh::surface::quadratic_normal;
 use crate::vector::dot;
 
 impl GatheredSurface {
     /// Unit normal of each node, and its share of the area: the integral of its shape function, seen along the normal; with
     /// quadratic ones that of [`quadratic`]. A pressure times that area along that normal is what the pressure on the faces
-    /// does to the node.
+    /// does to the node. Normals are means of those of the faces around it, weighted by area: of quadratic faces of those at the node,
+    /// so that they are as exact at the end of a curved surface as inside.
     pub fn normals_and_areas(&self) -> Vec<([f64; 3], f64)> {
         let mut sums = vec![[0.0; 3]; self.nodes.len()];
-        for (triangle, vector) in self.triangles.iter().zip(self.area_vectors()) {
-            for &corner in triangle {
-                (0..3).for_each(|a| sums[corner][a] += self.share * vector[a] / 3.0);
+        let mut add = |node: usize, factor: f64, vector: [f64; 3]| {
+            sums[node].iter_mut().zip(vector).for_each(|(sum, x)| *sum += factor * x);
+        };
+        for face in &self.quadratic {
+            let places = face.map(|node| self.points[node]);
+            face.iter().zip(smooth::NODES).for_each(|(&node, at)| add(node, 1.0, quadratic_normal(&places, at)));
+        }
+        if self.quadratic.is_empty() {
+            for (triangle, vector) in self.triangles.iter().zip(self.area_vectors()) {
+                triangle.iter().for_each(|&corner| add(corner, self.share / 3.0, vector));
             }
         }
         let parts = |sum: [f64; 3]| {

@@ -109,6 +109,7 @@ mod tests {
             part: 0,
             slaves: vec![(7, 1.0)],
             masters: masters.to_vec(),
+            vectors: Vec::new(),
             normal: unit(normal).expect("not zero"),
             gap: 0.0,
             area: 1.0,

@@ -51,6 +51,7 @@ pub fn conditions(contact: usize, slave: &GatheredSurface, master: &GatheredSurf
             part: slave.parts[k],
             slaves: vec![(slave.nodes[k], 1.0)],
             masters: vec![(master.nodes[node], 1.0)],
+            vectors: Vec::new(),
             normal: normals[k],
             gap,
             area,

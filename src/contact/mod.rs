@@ -43,6 +43,9 @@ pub struct ContactPair {
     pub slaves: Vec<(u64, f64)>,
     /// Global nodes on the master surface with their weights, which add up to one; none on a rigid obstacle.
     pub masters: Vec<(u64, f64)>,
+    /// Where the normal varies over the condition: of these nodes, slaves first, the weights times normals. Those of both sides have one
+    /// sum. Empty where all are weights times `normal`.
+    pub vectors: Vec<[f64; 3]>,
     /// Unit vector towards the other side. Between surfaces: the outward normal of the slave surface at the node, mean of
     /// the adjacent triangles' area vectors. At a rigid obstacle: straight into it.
     pub normal: [f64; 3],
@@ -58,9 +61,31 @@ pub struct ContactPair {
 }
 
 impl ContactPair {
+    /// Its nodes with their weights, those of the master with a minus.
+    pub fn nodes(&self) -> impl Iterator<Item = (u64, f64)> {
+        self.slaves.iter().copied().chain(self.masters.iter().map(|(node, weight)| (*node, -weight)))
+    }
+
+    /// Its nodes with their factors in the condition.
+    pub fn factors(&self) -> impl Iterator<Item = (u64, [f64; 3])> {
+        let vector = |at: usize, sign: f64| self.vectors.get(at).map(|vector| vector.map(|x| sign * x));
+        let slaves = self.slaves.len();
+        self.nodes().enumerate().map(move |(at, (node, weight))| {
+            let vector = vector(at, if at < slaves { 1.0 } else { -1.0 });
+            (node, vector.unwrap_or(self.normal.map(|n| weight * n)))
+        })
+    }
+
+    /// How far a motion of all slave nodes closes the condition, along each axis: `normal`, where that does not vary.
+    pub fn resultant(&self) -> [f64; 3] {
+        let slaves = self.vectors.get(..self.slaves.len());
+        let sum = |vectors: &[[f64; 3]]| std::array::from_fn(|a| vectors.iter().map(|vector| vector[a]).sum::<f64>());
+        slaves.map_or(self.normal, sum)
+    }
+
     /// Force on the slave surface where the condition is met with this force: the master's nodes take all of it.
     pub fn force(&self, force: f64) -> [f64; 3] {
-        self.normal.map(|n| -force * n)
+        self.resultant().map(|n| -force * n)
     }
 }
 

@@ -7,8 +7,13 @@
 //! `n_j . (sum of D_jk / W_j x_k - sum of M_jl / W_j x_l) <= 0`
 //!
 //! at positions `x` after the displacement (Wohlmuth 2011; Popp, Gitterle, Gee, Wall 2010). The sums run over slave nodes `k`,
-//! usually `j` alone, and master nodes `l`. A distance `c` that is prescribed along the surface's normals opens it by
-//! `c n_j . (sum of D_jk / W_j n_k)`, which is `c` but on curved quadratic faces. A constant pressure acts with the same resultant on both sides and on every
+//! usually `j` alone, and master nodes `l`. On quadratic faces that are curved the normal varies, as wide faces need it: with the
+//! normals of all slave nodes between them, `n(x)`, it is
+//!
+//! `sum of d_jk . x_k - sum of m_jl . x_l <= 0`,   `d_jk = integral of psi_j phi_k n / A_j`,   `A_j = integral of psi_j n . n_j`,
+//!
+//! and `m_jl` likewise. Then a constant pressure acts along `n` everywhere. A distance `c` that is prescribed along the surface's normals
+//! opens a condition by `c` times the sum of `d_jk . n_k`, which is `c` but there. A constant pressure acts with the same resultant on both sides and on every
 //! node as it should: flat surfaces pass the patch test whatever their meshes. Normals stay those of the start.
 //!
 //! All integrals are over what has the master opposite. On faces that it covers in part, multipliers move to its edge
@@ -26,10 +31,10 @@ use std::collections::BTreeMap;
 use super::dual::{self, DualFunctions};
 use super::opposite::{Face, INSIDE, IntegrationPoint, Opposite, Seen, faces, functions, line};
 use super::patch::Line;
-use super::surface::{GatheredSurface, Layer};
+use super::surface::{GatheredSurface, Layer, unit};
 use super::{Conditions, ContactError, ContactPair, MasterNode, edge, quadratic};
 use crate::mesh::surface;
-use crate::vector::{difference, dot};
+use crate::vector::{difference, dot, length};
 
 /// Share of its surface that a slave node must have opposite a master.
 const COVERED: f64 = 1e-6;
@@ -38,6 +43,9 @@ const COVERED: f64 = 1e-6;
 /// would say almost the same as those of its neighbours, and the dual problem would be nearly singular. One corner of every face
 /// reaches a third.
 const REACH: f64 = 0.25;
+
+/// Normals are one up to this.
+const ROUNDING: f64 = 1e-12;
 
 /// The same share from which a node counts as covered in results: coordinates of parts that meet differ by rounding.
 const AT_THE_EDGE: f64 = 1.0 - 1e-3;
@@ -62,8 +70,32 @@ struct Sums {
     whole: f64,
     /// As `whole`, each triangle's part seen along the node's normal.
     area: f64,
-    slaves: BTreeMap<usize, f64>,
-    masters: BTreeMap<u64, f64>,
+    slaves: BTreeMap<usize, Weight>,
+    masters: BTreeMap<u64, Weight>,
+}
+
+/// Integrals of the functions of a node.
+#[derive(Clone, Copy, Default)]
+struct Weight {
+    size: f64,
+    /// With the normals of the surface.
+    along: [f64; 3],
+}
+
+impl Weight {
+    fn of(size: f64, normal: [f64; 3]) -> Self {
+        Self { size, along: normal.map(|n| size * n) }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.size += other.size;
+        self.along.iter_mut().zip(other.along).for_each(|(along, x)| *along += x);
+    }
+
+    /// Whether normals differ from this one, but for round-off of a sum of this size.
+    fn is_curved(&self, normal: [f64; 3], whole: f64) -> bool {
+        length(difference(self.along, normal.map(|n| self.size * n))) > ROUNDING * whole
+    }
 }
 
 /// The lines through the triangles of a surface along which those of the other are looked for.
@@ -89,7 +121,7 @@ pub fn conditions(
     let is_held = |node: usize| is_held(normals[node].0, held[node]);
     let active: Vec<bool> = (0..reach.len()).map(|node| reach[node] >= REACH && !is_held(node)).collect();
     let mut sums: BTreeMap<usize, Sums> = BTreeMap::new();
-    parts.iter().for_each(|part| add(&mut sums, part, &active, master));
+    parts.iter().for_each(|part| add(&mut sums, part, &active, &normals, master));
     sums.retain(|&node, sums| slave.layer(node) == Layer::Own && sums.whole > COVERED * normals[node].1);
     let of_node: BTreeMap<usize, usize> = sums.keys().copied().zip(0..).collect();
     let told = |node: &usize| slave.tells(*node);
@@ -97,31 +129,39 @@ pub fn conditions(
     let held = (0..reach.len()).filter(told).filter(|&node| reach[node] >= REACH && is_held(node)).count();
     let condition = |(node, sums): (usize, Sums)| {
         let (normal, origin) = (normals[node].0, slave.points[node]);
-        let along = |point: [f64; 3]| dot(normal, difference(point, origin));
         let place = |node: u64| master.points[master.nodes.binary_search(&node).expect("it is on the surface")];
         let Sums { whole, area, slaves, masters } = sums;
-        ContactPair {
+        let of_slaves = merged(slaves.iter().map(|(&k, weight)| (slave.nodes[k], *weight)));
+        let weights = || of_slaves.values().chain(masters.values());
+        let is_curved = weights().any(|weight| weight.is_curved(normal, whole));
+        // What a constant pressure on the surface does along the node's normal.
+        let seen: f64 = slaves.values().map(|weight| dot(weight.along, normal)).sum();
+        let along = |weight: &Weight| match is_curved {
+            true => weight.along.map(|x| x / seen),
+            false => normal.map(|n| weight.size / whole * n),
+        };
+        let over = |weight: &Weight, vector: [f64; 3]| dot(along(weight), vector);
+        // Where both surfaces are a distance of one apart along the normals of the slave.
+        let opening: f64 = slaves.iter().map(|(&k, weight)| over(weight, normals[k].0)).sum();
+        let of_master = masters.iter().map(|(&l, weight)| over(weight, difference(place(l), origin)));
+        let of_slave = slaves.iter().map(|(&k, weight)| over(weight, difference(slave.points[k], origin)));
+        let pair = ContactPair {
             contact,
             slave: slave.nodes[node],
             part: slave.parts[node],
-            gap: masters.iter().map(|(&l, sum)| sum / whole * along(place(l))).sum::<f64>()
-                - slaves.iter().map(|(&k, sum)| sum / whole * along(slave.points[k])).sum::<f64>(),
-            slaves: merged(slaves.into_iter().map(|(k, sum)| (slave.nodes[k], sum / whole))),
-            masters: masters.into_iter().map(|(l, sum)| (l, sum / whole)).collect(),
+            gap: of_master.sum::<f64>() - of_slave.sum::<f64>(),
+            vectors: if is_curved { weights().map(along).collect() } else { Vec::new() },
+            slaves: of_slaves.iter().map(|(&node, weight)| (node, weight.size / whole)).collect(),
+            masters: masters.iter().map(|(&node, weight)| (node, weight.size / whole)).collect(),
             normal,
-            area,
+            area: if is_curved { seen } else { area },
             share: shares[node],
             covered: reach[node] >= AT_THE_EDGE,
-        }
+        };
+        (pair, opening)
     };
-    // Where both surfaces are a distance of one apart along the normals of the slave, means see that along the normal of the node.
-    let opening = |(&node, sums): (&usize, &Sums)| {
-        let along = |(&k, sum): (&usize, &f64)| sum / sums.whole * dot(normals[k].0, normals[node].0);
-        sums.slaves.iter().map(along).sum()
-    };
-    let openings = sums.iter().map(opening).collect();
     let masters = master_nodes(contact, &parts, master, &of_node);
-    let pairs = sums.into_iter().map(condition).collect();
+    let (pairs, openings) = sums.into_iter().map(condition).unzip();
     (Conditions { pairs, masters, count, held, openings }, !parts.is_empty())
 }
 
@@ -152,10 +192,10 @@ pub fn pair(
 }
 
 /// Weights of nodes, each once.
-fn merged(weights: impl Iterator<Item = (u64, f64)>) -> Vec<(u64, f64)> {
-    let mut sums: BTreeMap<u64, f64> = BTreeMap::new();
-    weights.for_each(|(node, weight)| *sums.entry(node).or_default() += weight);
-    sums.into_iter().collect()
+fn merged(weights: impl Iterator<Item = (u64, Weight)>) -> BTreeMap<u64, Weight> {
+    let mut sums: BTreeMap<u64, Weight> = BTreeMap::new();
+    weights.for_each(|(node, weight)| sums.entry(node).or_default().add(&weight));
+    sums
 }
 
 /// The covered parts of all slave faces that have any.
@@ -222,7 +262,13 @@ fn is_held(normal: [f64; 3], held: [bool; 3]) -> bool {
 }
 
 /// Adds what one face gives to the sums of its active corners.
-fn add(sums: &mut BTreeMap<usize, Sums>, part: &Part, active: &[bool], master: &GatheredSurface) {
+fn add(
+    sums: &mut BTreeMap<usize, Sums>,
+    part: &Part,
+    active: &[bool],
+    normals: &[([f64; 3], f64)],
+    master: &GatheredSurface,
+) {
     let Part { face, seen, cosines, .. } = part;
     let active = [0, 1, 2].map(|k| active[face[k]]);
     if !active.contains(&true) {
@@ -233,24 +279,33 @@ fn add(sums: &mut BTreeMap<usize, Sums>, part: &Part, active: &[bool], master: &
         let of_node = sums.entry(face[j]).or_default();
         if face.len() == 3 {
             for k in (0..3).filter(|&k| integrals[j][k] != 0.0) {
-                *of_node.slaves.entry(face[k]).or_default() += integrals[j][k];
+                of_node.slaves.entry(face[k]).or_default().add(&Weight::of(integrals[j][k], normals[face[j]].0));
             }
         }
         for IntegrationPoint { area, at, masters } in &seen.points {
             let psi = area * dot(psi[j], *at);
-            for (node, value) in masters {
-                *of_node.masters.entry(master.nodes[*node]).or_default() += psi * value;
-            }
+            let mut normal = normals[face[j]].0;
             if face.len() > 3 {
-                functions(face, *at)
-                    .into_iter()
-                    .for_each(|(k, value)| *of_node.slaves.entry(k).or_default() += psi * value);
+                let own = functions(face, *at);
+                normal = mean(own.iter().map(|&(k, value)| (normals[k].0, value))).unwrap_or(normal);
+                for (k, value) in own {
+                    of_node.slaves.entry(k).or_default().add(&Weight::of(psi * value, normal));
+                }
+            }
+            for (node, value) in masters {
+                of_node.masters.entry(master.nodes[*node]).or_default().add(&Weight::of(psi * value, normal));
             }
         }
         let whole: f64 = integrals[j].iter().sum();
         of_node.whole += whole;
         of_node.area += cosines[j] * whole;
     }
+}
+
+/// The direction of a sum of weighted vectors.
+fn mean(vectors: impl Iterator<Item = ([f64; 3], f64)>) -> Option<[f64; 3]> {
+    let add = |sum: [f64; 3], (vector, weight): ([f64; 3], f64)| std::array::from_fn(|a| sum[a] + weight * vector[a]);
+    unit(vectors.fold([0.0; 3], add))
 }
 
 /// The multipliers' functions on a part, and their integrals with the linear functions of the face.

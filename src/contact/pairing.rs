@@ -5,7 +5,7 @@
 //! enter between its own. If that does not decide either, it is the one named first.
 
 use super::patch::Patch;
-use super::{Conditions, ContactError, ContactPair, matching, mortar, quadratic};
+use super::{Conditions, ContactError, matching, mortar, quadratic};
 use crate::comm::{Comm, sums};
 
 /// What the conditions on the slave nodes are.
@@ -77,9 +77,8 @@ impl Pairing<'_> {
         }
         let mut found = matching::conditions(self.contact, one, &opposite, facing?);
         if slave.is_quadratic && master.is_quadratic {
-            let gap = |pair: &ContactPair, along| quadratic::distance(one, &opposite, pair, along);
             let count = found.pairs.len();
-            found.pairs = quadratic::conditions(one, found.pairs, gap);
+            found.pairs = quadratic::conditions(one, found.pairs);
             assert_eq!(found.pairs.len(), count, "covered faces have all their corners");
         }
         [found.count] = sums(self.comm, [found.masters.len() as u64]).map(|count| count as usize);

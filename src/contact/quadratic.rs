@@ -10,13 +10,15 @@
 //! Then the coefficient of a corner is its displacement, that of the middle `m` of the edge `a b` is
 //! `(u_m - s (u_a + u_b)) / (1 - 2 s)`, whose weights add up to one, and with multipliers dual to that basis there is one condition a coefficient. All
 //! multipliers are forces of the same sense, and a constant pressure passes exactly where meshes match. Nodes meet nodes
-//! here; [`super::mortar`] is for meshes that do not match.
+//! here, each along its own normal: that of a middle is the coefficient `(n_m . u_m - s (n_a . u_a + n_b . u_b)) / (1 - 2 s)` of the
+//! displacements along the normals. So a constant pressure acts along the normals of a curved surface, and all nodes meet a distance that is
+//! prescribed along these; [`super::mortar`] is for meshes that do not match.
 
 use std::collections::{BTreeMap, HashMap};
 
 use super::ContactPair;
 use super::surface::GatheredSurface;
-use crate::vector::{difference, dot};
+use crate::vector::{difference, length};
 
 /// What a corner gets of the function of an edge's middle.
 pub const SHARE: f64 = 0.2;
@@ -48,13 +50,11 @@ fn areas_by(
     areas
 }
 
-/// From conditions on nodes to those on coefficients. `gap` is the distance, along a direction, of a pair. Middles of which a
-/// corner has no condition have none either.
-pub fn conditions(
-    slave: &GatheredSurface,
-    pairs: Vec<ContactPair>,
-    gap: impl Fn(&ContactPair, [f64; 3]) -> f64,
-) -> Vec<ContactPair> {
+/// Normals are one up to this.
+const ROUNDING: f64 = 1e-12;
+
+/// From conditions on nodes to those on coefficients. Middles of which a corner has no condition have none either.
+pub fn conditions(slave: &GatheredSurface, pairs: Vec<ContactPair>) -> Vec<ContactPair> {
     let mut ends: BTreeMap<(u64, u32), [(u64, u32); 2]> = BTreeMap::new();
     for face in &slave.quadratic {
         let nodes = face.map(|node| (slave.nodes[node], slave.parts[node]));
@@ -66,27 +66,20 @@ pub fn conditions(
     }
     let of_node: HashMap<(u64, u32), &ContactPair> = pairs.iter().map(|pair| ((pair.slave, pair.part), pair)).collect();
     let condition = |pair: &ContactPair| {
-        let Some(ends) = ends.get(&(pair.slave, pair.part)) else { return Some(pair.clone()) };
+        let Some([a, b]) = ends.get(&(pair.slave, pair.part)) else { return Some(pair.clone()) };
         let (own, share) = (1.0 / (1.0 - 2.0 * SHARE), -SHARE / (1.0 - 2.0 * SHARE));
-        let mut result = ContactPair { gap: own * pair.gap, ..pair.clone() };
-        result.slaves.iter_mut().chain(&mut result.masters).for_each(|(_, weight)| *weight *= own);
-        for end in ends {
-            let corner = of_node.get(end)?;
-            result.slaves.push((end.0, share));
-            result.masters.extend(corner.masters.iter().map(|(node, weight)| (*node, share * weight)));
-            result.gap += share * gap(corner, pair.normal);
-        }
-        Some(result)
+        let parts = [(pair, own), (*of_node.get(a)?, share), (*of_node.get(b)?, share)];
+        let weighted = |nodes: fn(&ContactPair) -> &Vec<(u64, f64)>| {
+            parts.iter().flat_map(|(of, factor)| nodes(of).iter().map(move |(node, w)| (*node, factor * w))).collect()
+        };
+        let (slaves, masters): (Vec<_>, Vec<_>) = (weighted(|of| &of.slaves), weighted(|of| &of.masters));
+        let is_curved = parts.iter().any(|(of, _)| length(difference(of.normal, pair.normal)) > ROUNDING);
+        let sides = if is_curved { 1 + usize::from(!masters.is_empty()) } else { 0 };
+        let vectors = parts.map(|(of, factor)| of.normal.map(|n| factor * n)).repeat(sides);
+        let gap = parts.iter().map(|(of, factor)| factor * of.gap).sum();
+        Some(ContactPair { slaves, masters, vectors, gap, ..pair.clone() })
     };
     pairs.iter().filter_map(condition).collect()
-}
-
-/// Distance between a slave node and the master node opposite, along a direction.
-pub fn distance(slave: &GatheredSurface, master: &GatheredSurface, pair: &ContactPair, direction: [f64; 3]) -> f64 {
-    let place = |surface: &GatheredSurface, node: u64| {
-        surface.points[surface.nodes.binary_search(&node).expect("it is on the surface")]
-    };
-    dot(direction, difference(place(master, pair.masters[0].0), place(slave, pair.slave)))
 }
 
 #[cfg(test)]
@@ -94,6 +87,7 @@ mod tests {
     use super::*;
     use crate::contact::matching;
     use crate::mesh::surface::shares;
+    use crate::vector::dot;
 
     /// A square of two quadratic faces at a height; looking down if `turned`.
     fn square(z: f64, first: u64, turned: bool) -> GatheredSurface {
@@ -121,11 +115,11 @@ mod tests {
     fn a_constant_pressure_passes_exactly() {
         let (slave, master) = (square(0.3, 100, true), square(0.0, 0, false));
         let pairs = matching::pair(0, &slave, &master).expect("they match").pairs;
-        let pairs = conditions(&slave, pairs, |pair, along| distance(&slave, &master, pair, along));
+        let pairs = conditions(&slave, pairs);
         assert_eq!(pairs.len(), 9);
         let mut forces = [[0.0; 9]; 2];
         for pair in &pairs {
-            assert!(pair.area > 0.0);
+            assert!(pair.area > 0.0 && pair.vectors.is_empty());
             pair.slaves.iter().for_each(|(node, weight)| forces[0][(node - 100) as usize] += weight * pair.area);
             pair.masters.iter().for_each(|(node, weight)| forces[1][*node as usize] += weight * pair.area);
             for weights in [&pair.slaves, &pair.masters] {
@@ -143,12 +137,47 @@ mod tests {
         }
     }
 
+    /// The forces of a constant pressure on a bent surface are along its normals, and a motion along these meets all conditions alike.
+    #[test]
+    fn on_a_curved_surface_pressures_and_motions_are_along_the_normals() {
+        let round = |z: f64, first: u64, turned: bool| {
+            let mut surface = square(0.0, first, turned);
+            for [x, y, height] in &mut surface.points {
+                (*x, *y) = (*x - 1.0, *y - 1.0);
+                *height = z - (4.0 - *x * *x - *y * *y).sqrt();
+            }
+            surface
+        };
+        let (slave, master) = (round(0.0, 100, true), round(0.0, 0, false));
+        let pairs = matching::pair(0, &slave, &master).expect("they match").pairs;
+        let normals: BTreeMap<u64, [f64; 3]> = pairs.iter().map(|pair| (pair.slave, pair.normal)).collect();
+        let found = conditions(&slave, pairs);
+        assert_eq!(found.iter().filter(|pair| !pair.vectors.is_empty()).count(), 5, "middles");
+        let mut forces: BTreeMap<u64, [f64; 3]> = BTreeMap::new();
+        for pair in &found {
+            let factors: Vec<_> = pair.factors().collect();
+            let motion = |(node, factor): &(u64, [f64; 3])| normals.get(node).map_or(0.0, |n| dot(*factor, *n));
+            assert!((factors.iter().map(motion).sum::<f64>() - 1.0).abs() < 1e-14);
+            let still = (0..3).map(|a| factors.iter().map(|(_, factor)| factor[a]).sum::<f64>());
+            assert!(still.into_iter().all(|sum| sum.abs() < 1e-14), "a translation of all meets all");
+            for (node, factor) in factors {
+                let force = forces.entry(node).or_default();
+                (0..3).for_each(|a| force[a] += pair.area * factor[a]);
+            }
+        }
+        for (node, normal) in normals {
+            let across = crate::vector::cross(forces[&node], normal);
+            assert!(length(across) < 1e-14, "{node}: {across:?}");
+            assert!((0..3).all(|a| (forces[&node][a] + forces[&(node - 100)][a]).abs() < 1e-14));
+        }
+    }
+
     #[test]
     fn middles_beside_a_corner_without_condition_have_none() {
         let (slave, master) = (square(0.3, 100, true), square(0.0, 0, false));
         let mut pairs = matching::pair(0, &slave, &master).expect("they match").pairs;
         pairs.retain(|pair| pair.slave != 100);
-        let left = conditions(&slave, pairs, |pair, along| distance(&slave, &master, pair, along));
+        let left = conditions(&slave, pairs);
         assert_eq!(left.iter().map(|pair| pair.slave).collect::<Vec<_>>(), [102, 105, 106, 107, 108]);
     }
 }

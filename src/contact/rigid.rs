@@ -41,15 +41,16 @@ pub fn pair(
     let own = nodes.zip(&surface.parts).enumerate().filter(|(index, _)| surface.layer(*index) == Layer::Own);
     let pairs = own.filter_map(|(_, (((&slave, &point), (outward, area)), &part))| {
         let (normal, gap) = approach(obstacle, point, outward)?;
-        let (slaves, masters) = (vec![(slave, 1.0)], Vec::new());
-        let pair = ContactPair { contact, slave, part, slaves, masters, normal, gap, area, share: area, covered: true };
+        let (slaves, masters, vectors) = (vec![(slave, 1.0)], Vec::new(), Vec::new());
+        let (share, covered) = (area, true);
+        let pair = ContactPair { contact, slave, part, slaves, masters, vectors, normal, gap, area, share, covered };
         (dot(normal, outward) > FACING).then_some(pair)
     });
-    let along = |pair: &ContactPair, direction| pair.gap * dot(pair.normal, direction);
-    let mut pairs = quadratic::conditions(surface, pairs.collect(), along);
+    let mut pairs = quadratic::conditions(surface, pairs.collect());
     // What is left of several parts of a node is one condition if it says the same.
     pairs.dedup_by(|next, first| {
-        let same = (next.slave, next.normal, &next.slaves) == (first.slave, first.normal, &first.slaves);
+        let what = |pair: &ContactPair| (pair.slave, pair.normal, pair.slaves.clone(), pair.vectors.clone());
+        let same = what(next) == what(first);
         if same {
             (first.area, first.share) = (first.area + next.area, first.share + next.share);
         }

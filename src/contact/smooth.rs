@@ -58,7 +58,7 @@ fn normals(face: &[u64], place: impl Fn(u64) -> [f64; 3]) -> Vec<Option<[f64; 3]
 }
 
 /// The nodes of a quadratic face between its corners.
-const NODES: [[f64; 3]; 6] =
+pub const NODES: [[f64; 3]; 6] =
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
 
 /// Cuts the faces around a node into chains of smooth neighbours.

@@ -118,7 +118,7 @@ impl Given<'_> {
         let of_support = |s: &Support| moved.support.get(&s.name).copied().unwrap_or_default();
         let of_contact = |name: &String| moved.contact.get(name).copied().unwrap_or_default();
         let obstacles: Vec<[f64; 3]> = scene.contact.keys().map(of_contact).collect();
-        let gap = |pair: &ContactPair| pair.gap + dot(pair.normal, obstacles[pair.contact]);
+        let gap = |pair: &ContactPair| pair.gap + dot(pair.resultant(), obstacles[pair.contact]);
         let is_moved = |(_, pair): &(usize, &ContactPair)| obstacles[pair.contact] != [0.0; 3];
         let moving = self.contacts.pairs.iter().filter(is_moved);
         Prescribed {

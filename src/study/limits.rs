@@ -145,9 +145,8 @@ fn add_contact(
 ) {
     let (pair, Site { place, facet }) = (&discrete.contacts.pairs[index], discrete.contacts.pairs.site(index));
     let (name, contact) = scene.contact.iter().nth(pair.contact).expect("a pair belongs to a contact");
-    let masters = pair.masters.iter().map(|(node, weight)| (*node, -weight));
     let moved = contact.displacement().map(|d| -d * obstacle_factor(scene, name, at));
-    let motion = pair.slaves.iter().copied().chain(masters).fold(moved, |sum, (node, weight)| {
+    let motion = pair.nodes().fold(moved, |sum, (node, weight)| {
         let u = of_nodes.get(&[node]).map_or([0.0; 3], |u| std::array::from_fn(|a| f64::from_bits(u[a])));
         std::array::from_fn(|a| sum[a] + weight * u[a])
     });

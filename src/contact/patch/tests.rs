@@ -36,9 +36,7 @@ fn whole(setup: &Setup) -> (Conditions, Rule) {
         |index: usize| GatheredSurface::gather(setup.comm, setup.subdomains(), discrete.contacts.surfaces[index]);
     let (slave, master) = (gather(0), gather(1));
     if let Some(found) = matching::pair(0, &slave, &master) {
-        let gap = |pair: &ContactPair, along| crate::contact::quadratic::distance(&slave, &master, pair, along);
-        let pairs = crate::contact::quadratic::conditions(&slave, found.pairs.clone(), gap);
-        let pairs = if slave.quadratic.is_empty() { found.pairs } else { pairs };
+        let pairs = crate::contact::quadratic::conditions(&slave, found.pairs);
         return (Conditions { pairs, ..found }, Rule::NodeToNode);
     }
     let interface = &discrete.decomposition.interface;
