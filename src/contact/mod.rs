@@ -28,6 +28,9 @@ pub mod tree;
 
 use thiserror::Error;
 
+/// Normals are one up to this.
+const ROUNDING: f64 = 1e-12;
+
 /// A condition on the slave surface, named after one of its nodes: linearised frictionless contact
 /// `normal . (sum of weight u_slave - sum of weight u_master) <= gap`.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,18 +129,12 @@ pub struct Conditions {
     pub count: usize,
     /// Slave nodes of all ranks that carry no condition because supports hold them.
     pub held: usize,
-    /// How far a distance of one along the surface's normals opens each condition: 1 but where a condition is a mean over a curved
-    /// surface. None where all are 1.
-    pub openings: Vec<f64>,
 }
 
 impl Conditions {
     /// Sets the gaps to a distance that is given, or adds one to those that were found.
     pub fn prescribe(&mut self, clearance: Option<f64>, gap: f64) {
-        let openings = self.openings.iter().copied().chain(std::iter::repeat(1.0));
-        for (pair, opening) in self.pairs.iter_mut().zip(openings) {
-            pair.gap = clearance.map_or(pair.gap + opening * gap, |clearance| opening * clearance);
-        }
+        self.pairs.iter_mut().for_each(|pair| pair.gap = clearance.unwrap_or(pair.gap + gap));
     }
 }
 

@@ -7,14 +7,14 @@
 //! `n_j . (sum of D_jk / W_j x_k - sum of M_jl / W_j x_l) <= 0`
 //!
 //! at positions `x` after the displacement (Wohlmuth 2011; Popp, Gitterle, Gee, Wall 2010). The sums run over slave nodes `k`,
-//! usually `j` alone, and master nodes `l`. On quadratic faces that are curved the normal varies, as wide faces need it: with the
-//! normals of all slave nodes between them, `n(x)`, it is
+//! usually `j` alone, and master nodes `l`. On quadratic faces that are curved one normal does not do for all of a condition. With `n(x)`,
+//! the normals of the slave nodes between these, it is
 //!
-//! `sum of d_jk . x_k - sum of m_jl . x_l <= 0`,   `d_jk = integral of psi_j phi_k n / A_j`,   `A_j = integral of psi_j n . n_j`,
+//! `sum of d_jk . x_k - sum of m_jl . x_l <= 0`,   `d_jk = integral of psi_j phi_k n / A_j`,   `A_j = sum of integrals of psi_j phi_k n . n_k`,
 //!
-//! and `m_jl` likewise. Then a constant pressure acts along `n` everywhere. A distance `c` that is prescribed along the surface's normals
-//! opens a condition by `c` times the sum of `d_jk . n_k`, which is `c` but there. A constant pressure acts with the same resultant on both sides and on every
-//! node as it should: flat surfaces pass the patch test whatever their meshes. Normals stay those of the start.
+//! and `m_jl` likewise: a constant pressure acts along `n` everywhere, and a distance along the surface's normals opens all conditions by
+//! that much. Either way a constant pressure acts with the same resultant on both sides and on every node as it should: flat surfaces pass
+//! the patch test whatever their meshes. Normals stay those of the start.
 //!
 //! All integrals are over what has the master opposite. On faces that it covers in part, multipliers move to its edge
 //! ([`super::edge`]): none pushes beyond it. Nodes of which less than `REACH` of the way is covered carry no condition, nor do
@@ -32,7 +32,7 @@ use super::dual::{self, DualFunctions};
 use super::opposite::{Face, INSIDE, IntegrationPoint, Opposite, Seen, faces, functions, line};
 use super::patch::Line;
 use super::surface::{GatheredSurface, Layer, unit};
-use super::{Conditions, ContactError, ContactPair, MasterNode, edge, quadratic};
+use super::{Conditions, ContactError, ContactPair, MasterNode, ROUNDING, edge, quadratic};
 use crate::mesh::surface;
 use crate::vector::{difference, dot, length};
 
@@ -43,9 +43,6 @@ const COVERED: f64 = 1e-6;
 /// would say almost the same as those of its neighbours, and the dual problem would be nearly singular. One corner of every face
 /// reaches a third.
 const REACH: f64 = 0.25;
-
-/// Normals are one up to this.
-const ROUNDING: f64 = 1e-12;
 
 /// The same share from which a node counts as covered in results: coordinates of parts that meet differ by rounding.
 const AT_THE_EDGE: f64 = 1.0 - 1e-3;
@@ -134,18 +131,16 @@ pub fn conditions(
         let of_slaves = merged(slaves.iter().map(|(&k, weight)| (slave.nodes[k], *weight)));
         let weights = || of_slaves.values().chain(masters.values());
         let is_curved = weights().any(|weight| weight.is_curved(normal, whole));
-        // What a constant pressure on the surface does along the node's normal.
-        let seen: f64 = slaves.values().map(|weight| dot(weight.along, normal)).sum();
+        // `A_j`: how far slave nodes that all move by one along their normals close the condition.
+        let closed: f64 = slaves.iter().map(|(&k, weight)| dot(weight.along, normals[k].0)).sum();
         let along = |weight: &Weight| match is_curved {
-            true => weight.along.map(|x| x / seen),
+            true => weight.along.map(|x| x / closed),
             false => normal.map(|n| weight.size / whole * n),
         };
         let over = |weight: &Weight, vector: [f64; 3]| dot(along(weight), vector);
-        // Where both surfaces are a distance of one apart along the normals of the slave.
-        let opening: f64 = slaves.iter().map(|(&k, weight)| over(weight, normals[k].0)).sum();
         let of_master = masters.iter().map(|(&l, weight)| over(weight, difference(place(l), origin)));
         let of_slave = slaves.iter().map(|(&k, weight)| over(weight, difference(slave.points[k], origin)));
-        let pair = ContactPair {
+        ContactPair {
             contact,
             slave: slave.nodes[node],
             part: slave.parts[node],
@@ -154,15 +149,14 @@ pub fn conditions(
             slaves: of_slaves.iter().map(|(&node, weight)| (node, weight.size / whole)).collect(),
             masters: masters.iter().map(|(&node, weight)| (node, weight.size / whole)).collect(),
             normal,
-            area: if is_curved { seen } else { area },
+            area: if is_curved { closed } else { area },
             share: shares[node],
             covered: reach[node] >= AT_THE_EDGE,
-        };
-        (pair, opening)
+        }
     };
     let masters = master_nodes(contact, &parts, master, &of_node);
-    let (pairs, openings) = sums.into_iter().map(condition).unzip();
-    (Conditions { pairs, masters, count, held, openings }, !parts.is_empty())
+    let pairs = sums.into_iter().map(condition).collect();
+    (Conditions { pairs, masters, count, held }, !parts.is_empty())
 }
 
 /// What is wrong with the conditions of all ranks, if anything; `is_opposite` says whether surfaces face each other anywhere.

@@ -16,8 +16,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::ContactPair;
 use super::surface::GatheredSurface;
+use super::{ContactPair, ROUNDING};
 use crate::vector::{difference, length};
 
 /// What a corner gets of the function of an edge's middle.
@@ -49,9 +49,6 @@ fn areas_by(
     }
     areas
 }
-
-/// Normals are one up to this.
-const ROUNDING: f64 = 1e-12;
 
 /// From conditions on nodes to those on coefficients. Middles of which a corner has no condition have none either.
 pub fn conditions(slave: &GatheredSurface, pairs: Vec<ContactPair>) -> Vec<ContactPair> {

@@ -1,7 +1,8 @@
 //! Contact of meshes that do not match beyond homogeneous states: balance of forces where contact meets supports, and
 //! agreement with meshes that match.
 
-use crate::common::{assert_close, assert_residuals, number, scene_file, solve_tightly, vector};
+use crate::common::{assert_close, assert_residuals, number, scene_file, solve, solve_tightly, vector};
+use fetiplast::analytic::press_fit::PressFit;
 use serde_json::Value;
 
 /// A block on a larger one, pressed down and held at one side, down to the contact, where that side moves down too. The
@@ -88,4 +89,66 @@ fn both_solvers_find_one_solution_and_it_is_near_that_of_meshes_that_match() {
     assert_close("energy", number(&mortar, "energy"), number(&matching, "energy"), 0.01);
     let [mortar, matching] = [mortar, matching].map(|summary| vector(&summary["contact_force"])[2]);
     assert_close("contact force", mortar, matching, 0.01);
+}
+
+/// A quarter of two rings of tet10 that are pressed together, with so many cells around and through each.
+fn press_fit(PressFit { young, radii: [a, b, c], interference, length }: PressFit, cells: [[usize; 2]; 2]) -> String {
+    let ring = |name: &str, [inner, outer]: [f64; 2], [around, through]: [usize; 2]| {
+        format!(
+            r#"
+            [body.{name}]
+            material = "steel"
+            element = "tet10"
+            cylinder = {{ inner = {inner}, outer = {outer}, height = {length}, cells = [{around}, {through}, 1] }}
+            [support.{name}-x]
+            surface = "{name}.x0"
+            fix = ["x"]
+            [support.{name}-y]
+            surface = "{name}.y0"
+            fix = ["y"]
+            [support.{name}-z]
+            surface = "{name}.bottom"
+            fix = ["z"]"#
+        )
+    };
+    format!(
+        r#"
+        [material.steel]
+        young = {young:?}
+        poisson = 0.3
+        {}
+        {}
+        [contact.fit]
+        slave = "inside.outer"
+        master = "outside.inner"
+        clearance = -{interference}"#,
+        ring("inside", [a, b], cells[0]),
+        ring("outside", [b, c], cells[1])
+    )
+}
+
+/// On faces of 30 and 45 degrees: conditions follow the normals of curved surfaces.
+#[test]
+fn the_energy_of_a_press_fit_is_that_of_the_closed_form_whether_its_meshes_match_or_not() {
+    let fit = PressFit { young: 196_000.0, radii: [10.0, 15.0, 22.0], interference: 0.0025, length: 8.0 };
+    let (quarter, directory) = (0.25 * fit.force(), tempfile::tempdir().unwrap());
+    // A uniform pressure is more on the quarter's arc than what it pushes along an axis.
+    let along = quarter / std::f64::consts::FRAC_PI_2;
+    for (cells, rule, bounds) in [
+        ([[2, 6], [2, 6]], "node to node", [2e-3, 2e-2]),
+        ([[3, 6], [2, 6]], "mortar", [5e-4, 5e-3]),
+        ([[2, 6], [3, 6]], "mortar", [2e-3, 1e-2]),
+    ] {
+        let summary = solve(1, &scene_file(directory.path(), &press_fit(fit, cells)), &[]).converged().summary();
+        assert_eq!(summary["contacts"][0]["rule"], rule);
+        let energy = number(&summary, "energy") / (0.5 * quarter * fit.interference) - 1.0;
+        let force = vector(&summary["contact_force"]);
+        let force = (force[0].abs() + force[1].abs()) / (2.0 * along) - 1.0;
+        assert!(energy.abs() < bounds[0] && force.abs() < bounds[1], "{rule}: {energy:.1e} {force:.1e}");
+    }
+    // What is asked for is met, from the coarsest meshes.
+    let scene = scene_file(directory.path(), &press_fit(fit, [[3, 1], [2, 1]]));
+    let summary = solve(2, &scene, &["solver.error=0.005"]).converged().summary();
+    let energy = number(&summary, "energy") / (0.5 * quarter * fit.interference) - 1.0;
+    assert!(energy.abs() < 0.005, "{energy:.1e}");
 }

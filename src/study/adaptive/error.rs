@@ -9,10 +9,11 @@
 //! ```
 //!
 //! the larger one with the last two meshes on which `D_1` was at least `APART` times `D_2`. Until there is such a mesh, `theta` is
-//! `UNKNOWN`. Then it is at least `LEAST`: where bodies touch, conditions are those of a mesh, and energies need not fall. Where a limit
+//! `UNKNOWN`, or what meshes that are nearer tell, if that is more, up to `LARGEST`: a distance that hardly fell while the energy did was
+//! too small. Then it is at least `LEAST`: where bodies touch, conditions are those of a mesh, and energies need not fall. Where a limit
 //! load is sought, it is at least `LEAST_OF_LIMIT`: distances are far too large on coarse meshes there, and much of them can vanish with
 //! little of the error. Where an energy rises, the error is taken to be as large at least. `gap` bounds what the solver left. Energies of a
-//! history are those of its last increment, which begins from another state on each mesh: there `theta` is `OF_HISTORY`.
+//! history are those of its last increment, which begins from another state on each mesh: there `theta` is `UNKNOWN`.
 //!
 //! Of the stress: the estimate of `estimate`, by `SAFETY` larger.
 //!
@@ -25,8 +26,8 @@
 //! ```
 //!
 //! with the largest `theta` of the last three meshes as above, at least `LEAST_OF_NUMBER`. Measured over the error, from the second mesh
-//! that tells: 0.8 to 17, most of them 1 to 3. Where curved surfaces of meshes that do not match touch, conditions have an error
-//! that is in neither; there it was 0.4 to 1.
+//! that tells: 0.8 to 17, most of them 1 to 3. Where curved surfaces of linear elements touch whose meshes do not match, conditions have an
+//! error that is in neither.
 
 use crate::record::rows::{GoalRow, RefinementRow};
 use crate::scene::ErrorOf;
@@ -41,10 +42,11 @@ const APART: f64 = 2.0;
 const LEAST: f64 = 0.5;
 /// See [`LEAST`]; near limit loads it was 0.7 to 2.3.
 const LEAST_OF_LIMIT: f64 = 1.5;
-/// Where nothing tells it, the largest one.
+/// Where nothing tells it: of histories, in which each element counts with the largest distance of all increments, the largest that was
+/// found was 1.9.
 const UNKNOWN: f64 = 2.0;
-/// Of histories, in which each element counts with the largest distance of all increments.
-const OF_HISTORY: f64 = 1.5;
+/// On meshes before there is a second one that is far enough apart it was up to 2.7, and near ones told 1.3 to 18.
+const LARGEST: f64 = 3.0;
 
 /// Errors of numbers were up to 1.8 times what elements add up to on meshes that resolve the solution.
 const SAFETY_OF_SUM: f64 = 1.5;
@@ -62,7 +64,7 @@ pub fn estimate(of: &ErrorOf, meshes: &[RefinementRow]) -> f64 {
         ErrorOf::Goal(_) => of_goal(meshes),
         ErrorOf::Stress => SAFETY * last.stress,
         ErrorOf::Energy => {
-            let (theta, least) = if is_history(meshes) { (OF_HISTORY, 0.0) } else { (factor(meshes), rise(meshes)) };
+            let (theta, least) = if is_history(meshes) { (UNKNOWN, 0.0) } else { (factor(meshes), rise(meshes)) };
             let above = (theta * last.distance + last.gap).max(least);
             if above == 0.0 { 0.0 } else { above / last.size }
         }
@@ -124,10 +126,12 @@ fn compares(coarse: &RefinementRow, fine: &RefinementRow) -> bool {
 /// `theta`.
 fn factor(meshes: &[RefinementRow]) -> f64 {
     let Some((fine, coarser)) = meshes.split_last() else { return UNKNOWN };
-    let tells = |coarse: &&RefinementRow| coarse.distance >= APART * fine.distance && compares(coarse, fine);
+    let below = |apart: f64| move |coarse: &&RefinementRow| coarse.distance >= apart * fine.distance;
     let theta = |coarse: &RefinementRow| (coarse.energy - fine.energy) / (coarse.distance - fine.distance);
-    let told = coarser.iter().rev().filter(tells).take(2).map(theta);
-    told.reduce(f64::max).unwrap_or(UNKNOWN).max(if fine.limit_load.is_some() { LEAST_OF_LIMIT } else { LEAST })
+    let before = || coarser.iter().rev().filter(|coarse| compares(coarse, fine));
+    let told = before().filter(below(APART)).take(2).map(theta).reduce(f64::max);
+    let near = || before().filter(below(1.0)).map(theta).fold(UNKNOWN, f64::max).min(LARGEST);
+    told.unwrap_or_else(near).max(if fine.limit_load.is_some() { LEAST_OF_LIMIT } else { LEAST })
 }
 
 #[cfg(test)]
@@ -203,6 +207,10 @@ mod tests {
         // The first mesh saw less than there was.
         assert_eq!(error(&[known(-5.0, 1.0), known(-8.0, 2.0)]), UNKNOWN * 2.0 / 8.0);
         assert_eq!(error(&[known(-5.0, 1.0), known(-8.0, 2.0), known(-9.0, 1.0)]), 1.0 / 9.0);
+        // Meshes that are near tell what they can.
+        assert_eq!(error(&[known(-8.0, 1.5), known(-8.5, 1.0)]), UNKNOWN / 8.5);
+        assert_eq!(error(&[known(-8.0, 1.25), known(-8.625, 1.0)]), 2.5 / 8.625);
+        assert_eq!(error(&[known(-8.0, 1.25), known(-10.0, 1.0)]), LARGEST / 10.0);
         // The last but one is too near. Of those before it the last two count.
         let meshes = [known(-7.0, 4.0), known(-9.0, 1.5), known(-9.5, 1.0)];
         assert_eq!(error(&meshes), 2.5 / 3.0 / 9.5);
@@ -210,7 +218,7 @@ mod tests {
         assert_eq!(error(&[known(0.0, 9.0), known(-7.0, 4.0), known(-7.0, 4.0), known(-9.5, 1.0)]), 2.5 / 3.0 / 9.5);
         assert_eq!(error(&[known(-7.0, 4.0), known(-6.9, 1.0)]), LEAST / 6.9);
         let history = meshes.map(|row| RefinementRow { increments: 2, ..row });
-        assert_eq!(error(&history), OF_HISTORY / 9.5);
+        assert_eq!(error(&history), UNKNOWN / 9.5);
         assert_eq!(error(&[RefinementRow { gap: 0.5, ..known(-5.0, 1.0) }]), (UNKNOWN + 0.5) / 5.0);
         assert_eq!(error(&[known(0.0, 0.0)]), 0.0);
         // What rises cannot be known better than that.
