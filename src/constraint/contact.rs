@@ -1,5 +1,5 @@
 //! Contact rows: `normal . (weighted means over the copies of the slave side's nodes - the master's) <= gap`, made a unit
-//! vector.
+//! vector. Where the normal varies over a condition, each node has its own.
 //!
 //! Components that a support fixes leave the row and go to its right-hand side: contact rows stay orthogonal to
 //! support rows and the active rows independent. Of conditions with one direction (a node that meets two obstacles alike) only

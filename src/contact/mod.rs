@@ -46,11 +46,11 @@ pub struct ContactPair {
     pub slaves: Vec<(u64, f64)>,
     /// Global nodes on the master surface with their weights, which add up to one; none on a rigid obstacle.
     pub masters: Vec<(u64, f64)>,
-    /// Where the normal varies over the condition: of these nodes, slaves first, the weights times normals. Those of both sides have one
-    /// sum. Empty where all are weights times `normal`.
+    /// Where the normal varies over the condition: for each of these nodes, slaves first, what takes the place of its weight times
+    /// `normal`. Those of both sides have one sum. Empty where it does not vary.
     pub vectors: Vec<[f64; 3]>,
     /// Unit vector towards the other side. Between surfaces: the outward normal of the slave surface at the node, mean of
-    /// the adjacent triangles' area vectors. At a rigid obstacle: straight into it.
+    /// those of the faces around it, weighted by area. At a rigid obstacle: straight into it.
     pub normal: [f64; 3],
     /// Initial distance along the normal (length); negative where the bodies overlap.
     pub gap: f64,
@@ -71,11 +71,10 @@ impl ContactPair {
 
     /// Its nodes with their factors in the condition.
     pub fn factors(&self) -> impl Iterator<Item = (u64, [f64; 3])> {
-        let vector = |at: usize, sign: f64| self.vectors.get(at).map(|vector| vector.map(|x| sign * x));
         let slaves = self.slaves.len();
-        self.nodes().enumerate().map(move |(at, (node, weight))| {
-            let vector = vector(at, if at < slaves { 1.0 } else { -1.0 });
-            (node, vector.unwrap_or(self.normal.map(|n| weight * n)))
+        self.nodes().enumerate().map(move |(at, (node, weight))| match self.vectors.get(at) {
+            Some(vector) => (node, vector.map(|x| if at < slaves { x } else { -x })),
+            None => (node, self.normal.map(|n| weight * n)),
         })
     }
 
