@@ -49,8 +49,8 @@ pub fn pair(
     let mut pairs = quadratic::conditions(surface, pairs.collect());
     // What is left of several parts of a node is one condition if it says the same.
     pairs.dedup_by(|next, first| {
-        let what = |pair: &ContactPair| (pair.slave, pair.normal, pair.slaves.clone(), pair.vectors.clone());
-        let same = what(next) == what(first);
+        let same = (next.slave, next.normal) == (first.slave, first.normal)
+            && (&next.slaves, &next.vectors) == (&first.slaves, &first.vectors);
         if same {
             (first.area, first.share) = (first.area + next.area, first.share + next.share);
         }
