@@ -57,7 +57,8 @@ pub struct ContactPair {
     /// Share of the slave surface that belongs to the condition, seen along its outward normal: pressure is force over this
     /// area. Only what has the other side opposite counts.
     pub area: f64,
-    /// All of the slave surface that belongs to the condition, whether or not the other side is opposite (area).
+    /// Area of the limit of friction: where nodes match, and at obstacles, all of the slave surface that belongs to the node (area).
+    /// Else `area`.
     pub share: f64,
     /// Whether the node has the other side opposite; else the condition is at the edge of the other side, near it.
     pub covered: bool,

@@ -32,7 +32,7 @@ use super::dual::{self, DualFunctions};
 use super::opposite::{Face, INSIDE, IntegrationPoint, Opposite, Seen, faces, functions, line};
 use super::patch::Line;
 use super::surface::{GatheredSurface, Layer, unit};
-use super::{Conditions, ContactError, ContactPair, MasterNode, ROUNDING, edge, quadratic};
+use super::{Conditions, ContactError, ContactPair, MasterNode, ROUNDING, edge};
 use crate::mesh::surface;
 use crate::vector::{difference, dot, length};
 
@@ -109,10 +109,6 @@ pub fn conditions(
     held: &[[bool; 3]],
 ) -> (Conditions, bool) {
     let normals = slave.normals_and_areas();
-    let shares = match slave.quadratic.is_empty() {
-        true => normals.iter().map(|(_, area)| *area).collect(),
-        false => quadratic::areas_of_corners(slave),
-    };
     let parts = parts(slave, master, &normals);
     let reach = reach(&parts, slave.nodes.len());
     let is_held = |node: usize| is_held(normals[node].0, held[node]);
@@ -140,6 +136,7 @@ pub fn conditions(
         let over = |weight: &Weight, vector: [f64; 3]| dot(along(weight), vector);
         let of_master = masters.iter().map(|(&l, weight)| over(weight, difference(place(l), origin)));
         let of_slave = slaves.iter().map(|(&k, weight)| over(weight, difference(slave.points[k], origin)));
+        let area = if is_curved { closed } else { area };
         ContactPair {
             contact,
             slave: slave.nodes[node],
@@ -149,8 +146,8 @@ pub fn conditions(
             slaves: of_slaves.iter().map(|(&node, weight)| (node, weight.size / whole)).collect(),
             masters: masters.iter().map(|(&node, weight)| (node, weight.size / whole)).collect(),
             normal,
-            area: if is_curved { closed } else { area },
-            share: shares[node],
+            area,
+            share: area,
             covered: reach[node] >= AT_THE_EDGE,
         }
     };

@@ -26,20 +26,7 @@ pub const SHARE: f64 = 0.2;
 /// Area that belongs to the condition of each node, of the faces that count: of a corner the integral of its function, `2/3 s A`
 /// of each face `A`, of a middle the integral of its own, `(1 - 2 s) A / 3`.
 pub(super) fn areas(surface: &GatheredSurface, counts: impl Fn(&[usize; 6]) -> bool) -> Vec<f64> {
-    areas_by([2.0 * SHARE, 1.0 - 2.0 * SHARE], surface, counts)
-}
-
-/// The same where corners alone have conditions: the integral of the linear function of each.
-pub(super) fn areas_of_corners(surface: &GatheredSurface) -> Vec<f64> {
-    areas_by([1.0, 0.0], surface, |_| true)
-}
-
-/// Areas where each corner and each middle of a face gets so many thirds of it.
-fn areas_by(
-    [of_corner, of_middle]: [f64; 2],
-    surface: &GatheredSurface,
-    counts: impl Fn(&[usize; 6]) -> bool,
-) -> Vec<f64> {
+    let [of_corner, of_middle] = [2.0 * SHARE, 1.0 - 2.0 * SHARE];
     let mut areas = vec![0.0; surface.nodes.len()];
     let of_triangles: Vec<f64> = surface.corners().map(|corners| crate::mesh::surface::area(&corners)).collect();
     for (face, parts) in surface.quadratic.iter().zip(of_triangles.chunks_exact(4)).filter(|(face, _)| counts(face)) {
