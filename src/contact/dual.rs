@@ -6,6 +6,11 @@
 //! of `phi_l` (Wohlmuth 2011, section 4; on covered parts Cichosz and Bischoff 2011). So `integral of psi_j phi_l` is zero
 //! for two active corners, and the `psi` add up to one, which passes the patch test.
 //!
+//! A mean with dual functions is the value at the node where something is linear on the faces around it. Of something quadratic, such as
+//! the distance of a ball, that has no slope at the node it is too small: on each whole face by as much as means with `phi` are too
+//! large. So the functions [`even`](DualFunctions::even), half of `psi` and half of `phi~`, give the value at the node then, too. They are
+//! for faces whose conditions share nodes anyway.
+//!
 //! On narrow parts `N^-1` is large and amplifies what differs from linear. There `psi = phi~`, which is dual to nothing but as
 //! exact: only that conditions of neighbours share nodes then.
 
@@ -16,6 +21,16 @@ pub struct DualFunctions {
     pub functions: [[f64; 3]; 3],
     /// `integral of psi_j phi_l` (area).
     pub slave: [[f64; 3]; 3],
+}
+
+impl DualFunctions {
+    /// The mean of these and others.
+    pub fn even(self, others: Self) -> Self {
+        let mean = |a: [[f64; 3]; 3], b: [[f64; 3]; 3]| {
+            std::array::from_fn(|j| std::array::from_fn(|k| 0.5 * (a[j][k] + b[j][k])))
+        };
+        Self { functions: mean(self.functions, others.functions), slave: mean(self.slave, others.slave) }
+    }
 }
 
 /// Coefficients of `W N^-1` from which it is too large; on a whole triangle they are 3 and -1.
@@ -143,6 +158,28 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Squares of distances along any direction, by the middles of the edges of four triangles: exact for cubes.
+    #[test]
+    fn even_ones_find_no_distance_at_the_corner_that_a_quadratic_gap_touches() {
+        let mass = mass(PARTS[0]);
+        let dual = functions(&mass, [true; 3]).expect("it is wide");
+        let even = dual.even(positive(&mass, [true; 3]));
+        let thirds = [[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]].map(|at| at.map(|x| x / 6.0));
+        // Degree three: -9/16 of the centre and 25/48 of three points.
+        let points = [[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]].map(|at| (25.0 / 96.0, at));
+        let rule: Vec<(f64, [f64; 3])> = points.into_iter().chain([(-9.0 / 32.0, [1.0 / 3.0; 3])]).collect();
+        let mean = |of: &[[f64; 3]; 3], gap: &dyn Fn([f64; 3]) -> f64| -> f64 {
+            let value = |at: [f64; 3]| (0..3).map(|k| of[0][k] * at[k]).sum::<f64>() * gap(at);
+            rule.iter().map(|(weight, at)| weight * value(*at)).sum()
+        };
+        for [_, x, y] in thirds {
+            let gap = |at: [f64; 3]| (x * at[1] + y * at[2]) * (x * at[1] + y * at[2]);
+            assert!(mean(&even.functions, &gap).abs() < 1e-16);
+            assert!(mean(&dual.functions, &gap) < -1e-3);
+        }
+        assert!((mean(&even.functions, &|_| 1.0) - 1.0 / 6.0).abs() < 1e-16);
     }
 
     #[test]

@@ -24,7 +24,9 @@
 //! Quadratic faces carry conditions at their corners only, with the dual functions of the linear functions there and the
 //! integrals of products with all quadratic ones on either side (Popp, Wohlmuth, Gee and Wall 2012, "quadratic-linear"): the
 //! multipliers still add up to one, so a constant pressure acts on corners and middles as it should. Such a face is four
-//! triangles through its middles, which are the geometry; its functions are those of its own coordinates.
+//! triangles through its middles, which are the geometry; its functions are those of its own coordinates. Where the distance of the other
+//! side is bent over a face, as between a pin and its bore, its functions are the [even](DualFunctions::even) ones: dual ones find the surfaces
+//! into each other by a twelfth of what the distance grows by from a node to the next, where they only touch.
 
 use std::collections::BTreeMap;
 
@@ -44,6 +46,10 @@ const COVERED: f64 = 1e-6;
 /// reaches a third.
 const REACH: f64 = 0.25;
 
+/// A distance is bent if it differs from a linear one by this share of the width of its face: coordinates of flat surfaces may have been
+/// rounded to single precision.
+const BENT: f64 = 1e-6;
+
 /// The same share from which a node counts as covered in results: coordinates of parts that meet differ by rounding.
 const AT_THE_EDGE: f64 = 1.0 - 1e-3;
 
@@ -58,6 +64,8 @@ struct Part<'a> {
     places: Option<[[f64; 3]; 3]>,
     /// Cosines between its normal and those of its corners.
     cosines: [f64; 3],
+    /// Whether the distance of the other side is bent over it.
+    is_bent: bool,
 }
 
 /// The sums of one slave node's condition.
@@ -202,9 +210,42 @@ fn parts<'a>(slave: &'a GatheredSurface, master: &GatheredSurface, normals: &[([
         let area: f64 = seen.points.iter().map(|point| point.area).sum();
         let mean = |k: usize| seen.points.iter().map(|point| point.area * point.at[k]).sum::<f64>() / area;
         let places = edge::places(&seen.corners, [0, 1, 2].map(mean));
-        Some(Part { face: nodes, own, seen, places, cosines: ends.map(|node| dot(normals[node].0, along)) })
+        let cosines = ends.map(|node| dot(normals[node].0, along));
+        let is_bent = is_bent(nodes, &seen.points, along, [slave, master]);
+        Some(Part { face: nodes, own, seen, places, cosines, is_bent })
     };
     faces(slave).filter_map(part).collect()
+}
+
+/// Whether the distance along a direction is no linear function on the covered part of a face.
+fn is_bent(
+    face: &[usize],
+    points: &[IntegrationPoint],
+    along: [f64; 3],
+    [slave, master]: [&GatheredSurface; 2],
+) -> bool {
+    let place = |of: &GatheredSurface, weights: &[(usize, f64)]| {
+        weights.iter().map(|&(node, weight)| weight * dot(along, of.points[node])).sum::<f64>()
+    };
+    let distance = |point: &IntegrationPoint| place(master, &point.masters) - place(slave, &functions(face, point.at));
+    let distances: Vec<f64> = points.iter().map(distance).collect();
+    let of_corner = |k: usize| points.iter().zip(&distances).map(|(point, d)| point.area * point.at[k] * d).sum();
+    let (inverse, integrals) = (dual::invert(&mass(points)), [0, 1, 2].map(of_corner));
+    let linear = inverse.map(|row| dot(row, integrals));
+    let off = |(point, d): (&IntegrationPoint, &f64)| point.area * (d - dot(linear, point.at)).powi(2);
+    let area: f64 = points.iter().map(|point| point.area).sum();
+    points.iter().zip(&distances).map(off).sum::<f64>() > (BENT * area).powi(2)
+}
+
+/// Integrals of products of linear functions.
+fn mass(points: &[IntegrationPoint]) -> [[f64; 3]; 3] {
+    let mut mass = [[0.0; 3]; 3];
+    for IntegrationPoint { area, at, .. } in points {
+        for k in 0..3 {
+            (0..3).for_each(|l| mass[k][l] += area * at[k] * at[l]);
+        }
+    }
+    mass
 }
 
 /// How much of the way to each slave node is covered, at most, in the faces around it.
@@ -300,20 +341,19 @@ fn mean(vectors: impl Iterator<Item = ([f64; 3], f64)>) -> Option<[f64; 3]> {
 }
 
 /// The multipliers' functions on a part, and their integrals with the linear functions of the face.
-fn dual_functions(Part { seen, places, .. }: &Part, active: [bool; 3]) -> DualFunctions {
-    let mut mass = [[0.0; 3]; 3];
-    for IntegrationPoint { area, at, .. } in &seen.points {
-        for k in 0..3 {
-            (0..3).for_each(|l| mass[k][l] += area * at[k] * at[l]);
-        }
-    }
+fn dual_functions(Part { face, seen, places, is_bent, .. }: &Part, active: [bool; 3]) -> DualFunctions {
+    let mass = mass(&seen.points);
+    let functions = |mass: &[[f64; 3]; 3]| {
+        let dual = dual::functions(mass, active)?;
+        Some(if *is_bent && face.len() > 3 { dual.even(dual::positive(mass, active)) } else { dual })
+    };
     let Some(places) = places else {
-        return dual::functions(&mass, active).unwrap_or_else(|| dual::positive(&mass, active));
+        return functions(&mass).unwrap_or_else(|| dual::positive(&mass, active));
     };
     // `phi* = S phi` with `S = T^-T`, so `phi = T^T phi*`.
     let inverse = dual::invert(places);
     let moved = dual::multiply(&dual::multiply(&dual::transpose(&inverse), &mass), &inverse);
-    match dual::functions(&moved, active) {
+    match functions(&moved) {
         Some(DualFunctions { functions, slave }) => DualFunctions {
             functions: dual::multiply(&functions, &dual::transpose(&inverse)),
             slave: dual::multiply(&slave, places),

@@ -246,6 +246,22 @@ fn on_curved_surfaces_the_gap_converges_with_the_square_of_the_facets() {
     assert!(errors[2] < 2e-3 && errors.windows(2).all(|e| e[1] < 0.3 * e[0]), "{errors:?}");
 }
 
+/// A bowl of curvature 1 that touches a flat slave at the node in the middle: the nodes around are apart as they are, on quadratic
+/// faces; with dual functions all of them would be nearer by a twelfth of the curvature and the square of an edge.
+#[test]
+fn a_bowl_touches_quadratic_faces_where_it_does() {
+    let slave = quadratic(grid([6, 6], 100, true, |x, y| [2.0 * x - 1.0, 2.0 * y - 1.0, 0.0]));
+    let height = |x: f64, y: f64| -0.5 * (x * x + y * y);
+    let master = grid([80, 80], 5000, false, |x, y| [3.0 * x - 1.5, 3.0 * y - 1.5, 0.0]);
+    let raised = |p: &[f64; 3]| [p[0], p[1], height(p[0], p[1])];
+    let master = GatheredSurface { points: master.points.iter().map(raised).collect(), ..master };
+    for pair in paired(&slave, &master, &vec![FREE; slave.nodes.len()]) {
+        let [x, y, _] = slave.points[(pair.slave - 100) as usize];
+        let is_inner = x.abs() < 0.9 && y.abs() < 0.9;
+        assert!(!is_inner || (pair.gap + height(x, y)).abs() < 5e-4, "{} {}", pair.gap, height(x, y));
+    }
+}
+
 /// A slave that overhangs on two sides, by shares of its cells that leave nodes beyond the edge with much, half and hardly any
 /// cover: every condition pushes within the overlap on both sides, and some of them at its corners.
 #[test]
