@@ -160,26 +160,25 @@ mod tests {
         }
     }
 
-    /// Squares of distances along any direction, by the middles of the edges of four triangles: exact for cubes.
+    /// A gap `(x a + y b)^2` that touches the corner `(0, 0)`, along several directions.
     #[test]
-    fn even_ones_find_no_distance_at_the_corner_that_a_quadratic_gap_touches() {
+    fn even_functions_find_no_distance_at_a_corner_that_is_touched() {
         let mass = mass(PARTS[0]);
         let dual = functions(&mass, [true; 3]).expect("it is wide");
         let even = dual.even(positive(&mass, [true; 3]));
-        let thirds = [[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]].map(|at| at.map(|x| x / 6.0));
-        // Degree three: -9/16 of the centre and 25/48 of three points.
+        // Exact for cubes (Strang and Fix 1973).
         let points = [[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]].map(|at| (25.0 / 96.0, at));
         let rule: Vec<(f64, [f64; 3])> = points.into_iter().chain([(-9.0 / 32.0, [1.0 / 3.0; 3])]).collect();
-        let mean = |of: &[[f64; 3]; 3], gap: &dyn Fn([f64; 3]) -> f64| -> f64 {
-            let value = |at: [f64; 3]| (0..3).map(|k| of[0][k] * at[k]).sum::<f64>() * gap(at);
+        let of_corner = |of: &DualFunctions, gap: &dyn Fn([f64; 3]) -> f64| -> f64 {
+            let value = |at: [f64; 3]| (0..3).map(|k| of.functions[0][k] * at[k]).sum::<f64>() * gap(at);
             rule.iter().map(|(weight, at)| weight * value(*at)).sum()
         };
-        for [_, x, y] in thirds {
-            let gap = |at: [f64; 3]| (x * at[1] + y * at[2]) * (x * at[1] + y * at[2]);
-            assert!(mean(&even.functions, &gap).abs() < 1e-16);
-            assert!(mean(&dual.functions, &gap) < -1e-3);
+        for [a, b] in [[1.0, 0.0], [1.0, 1.0], [0.3, -0.8]] {
+            let gap = |at: [f64; 3]| (a * at[1] + b * at[2]).powi(2);
+            assert!(of_corner(&even, &gap).abs() < 1e-16);
+            assert!(of_corner(&dual, &gap) < -1e-3);
         }
-        assert!((mean(&even.functions, &|_| 1.0) - 1.0 / 6.0).abs() < 1e-16);
+        assert!((of_corner(&even, &|_| 1.0) - 1.0 / 6.0).abs() < 1e-16);
     }
 
     #[test]

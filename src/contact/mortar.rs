@@ -64,7 +64,7 @@ struct Part<'a> {
     places: Option<[[f64; 3]; 3]>,
     /// Cosines between its normal and those of its corners.
     cosines: [f64; 3],
-    /// Whether the distance of the other side is bent over it.
+    /// Whether it is quadratic, and the distance of the other side is bent over it.
     is_bent: bool,
 }
 
@@ -211,7 +211,7 @@ fn parts<'a>(slave: &'a GatheredSurface, master: &GatheredSurface, normals: &[([
         let mean = |k: usize| seen.points.iter().map(|point| point.area * point.at[k]).sum::<f64>() / area;
         let places = edge::places(&seen.corners, [0, 1, 2].map(mean));
         let cosines = ends.map(|node| dot(normals[node].0, along));
-        let is_bent = is_bent(nodes, &seen.points, along, [slave, master]);
+        let is_bent = nodes.len() > 3 && is_bent(nodes, &seen.points, along, [slave, master]);
         Some(Part { face: nodes, own, seen, places, cosines, is_bent })
     };
     faces(slave).filter_map(part).collect()
@@ -341,11 +341,11 @@ fn mean(vectors: impl Iterator<Item = ([f64; 3], f64)>) -> Option<[f64; 3]> {
 }
 
 /// The multipliers' functions on a part, and their integrals with the linear functions of the face.
-fn dual_functions(Part { face, seen, places, is_bent, .. }: &Part, active: [bool; 3]) -> DualFunctions {
+fn dual_functions(Part { seen, places, is_bent, .. }: &Part, active: [bool; 3]) -> DualFunctions {
     let mass = mass(&seen.points);
     let functions = |mass: &[[f64; 3]; 3]| {
         let dual = dual::functions(mass, active)?;
-        Some(if *is_bent && face.len() > 3 { dual.even(dual::positive(mass, active)) } else { dual })
+        Some(if *is_bent { dual.even(dual::positive(mass, active)) } else { dual })
     };
     let Some(places) = places else {
         return functions(&mass).unwrap_or_else(|| dual::positive(&mass, active));

@@ -1,8 +1,8 @@
 //! Contact at the nodes of the mesh: pressure on both sides, gap and status on the slave's.
 //!
 //! The pressure of a condition is its force over its area. So is its friction stress; but where a limit of the stress is given it is
-//! over the area that the limit counts, with what is beyond the edge of the other surface. A node of the master surface has the mean
-//! of the conditions around the place opposite, weighted by the slave's linear functions there. A node of several contacts, or of
+//! over the area that the limit counts: where nodes match, with what is beyond the edge of the other surface. A node of the master
+//! surface has the mean of the conditions around the place opposite, weighted by the slave's linear functions there. A node of several contacts, or of
 //! several smooth parts of one, shows the largest of its pressures and the smallest of its gaps; where contacts share nodes each has a
 //! field of its own beside these. Nodes beyond the edge of the other surface touch nothing, and show nothing.
 
