@@ -26,7 +26,7 @@
 //! multipliers still add up to one, so a constant pressure acts on corners and middles as it should. Such a face is four
 //! triangles through its middles, which are the geometry; its functions are those of its own coordinates. Where the distance of the other
 //! side is bent over a face, as between a pin and its bore, its functions are the [even](DualFunctions::even) ones: dual ones find the surfaces
-//! into each other by a twelfth of what the distance grows by from a node to the next, where they only touch.
+//! into each other by a tenth to two fifths of what the distance grows by from a node to the next, where they only touch.
 
 use std::collections::BTreeMap;
 

@@ -247,7 +247,7 @@ fn on_curved_surfaces_the_gap_converges_with_the_square_of_the_facets() {
 }
 
 /// A bowl of curvature 1 that touches a flat slave at the node in the middle: the nodes around are apart as they are, on quadratic
-/// faces; with dual functions all of them would be nearer by a twelfth of the curvature and the square of an edge.
+/// faces; with dual functions all of them would be nearer by a tenth to a fifth of the square of an edge.
 #[test]
 fn a_bowl_touches_quadratic_faces_where_it_does() {
     let slave = quadratic(grid([6, 6], 100, true, |x, y| [2.0 * x - 1.0, 2.0 * y - 1.0, 0.0]));
