@@ -27,7 +27,7 @@ pub struct Slider {
     /// Rows along the surface, one or two.
     pub tangents: Vec<Tangent>,
     /// All of the slave surface that belongs to the pair (area).
-    pub share: f64,
+    pub limit_area: f64,
 }
 
 /// A friction row.
@@ -158,9 +158,9 @@ impl Constraints {
                     match self.sliders.last_mut().filter(|last| last.pair == pair) {
                         Some(last) => last.tangents.push(tangent),
                         None => {
-                            let ContactPair { contact, share, .. } = pairs[pair];
+                            let ContactPair { contact, limit_area, .. } = pairs[pair];
                             let tangents = vec![tangent];
-                            self.sliders.push(Slider { pair, contact, normal: normals[&pair], tangents, share });
+                            self.sliders.push(Slider { pair, contact, normal: normals[&pair], tangents, limit_area });
                         }
                     }
                 }

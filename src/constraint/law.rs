@@ -170,7 +170,7 @@ impl<'a> Laws<'a> {
         let scale = self.rows[slider.tangents[0].row].scale;
         match self.friction[slider.contact] {
             None => 0.0,
-            Some(Friction::Tresca(limit)) => limit * slider.share / scale,
+            Some(Friction::Tresca(limit)) => limit * slider.limit_area / scale,
             Some(Friction::Coulomb(coefficient)) => {
                 coefficient * self.rows[slider.normal].scale * Law::Unilateral.project(normal) / scale
             }

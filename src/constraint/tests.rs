@@ -199,7 +199,7 @@ fn pair(slaves: &[(u64, f64)], masters: &[(u64, f64)]) -> ContactPair {
         normal,
         gap: 0.5,
         area: 1.0,
-        share: 1.0,
+        limit_area: 1.0,
         covered: true,
     }
 }

@@ -113,7 +113,7 @@ mod tests {
             normal: unit(normal).expect("not zero"),
             gap: 0.0,
             area: 1.0,
-            share: 1.0,
+            limit_area: 1.0,
             covered: true,
         };
         let pairs: Vec<ContactPair> = normals.iter().enumerate().map(pair).collect();

@@ -60,25 +60,26 @@ impl Pairs {
             let mut next = || rest.next().expect("conditions are whole");
             let [contact, slave, part, covered, slaves, masters, vectors] = [(); 7].map(|()| next());
             let mut real = || f64::from_bits(next());
-            let (normal, [gap, area, share]) = ([(); 3].map(|()| real()), [(); 3].map(|()| real()));
+            let (normal, [gap, area, limit_area]) = ([(); 3].map(|()| real()), [(); 3].map(|()| real()));
             let site = Site { place: [(); 3].map(|()| real()), facet: real() };
             let mut weights = |count: u64| (0..count).map(|_| (next(), f64::from_bits(next()))).collect();
             let (slaves, masters) = (weights(slaves), weights(masters));
             let vectors = (0..vectors).map(|_| [(); 3].map(|()| f64::from_bits(next()))).collect();
             let (contact, part, covered) = (contact as usize, part as u32, covered == 1);
             let pair =
-                ContactPair { contact, slave, part, slaves, masters, vectors, normal, gap, area, share, covered };
+                ContactPair { contact, slave, part, slaves, masters, vectors, normal, gap, area, limit_area, covered };
             self.known.insert(number as usize, (pair, site));
         }
     }
 }
 
 fn pack(number: usize, pair: &ContactPair, site: &Site, message: &mut Vec<u64>) {
-    let ContactPair { contact, slave, part, slaves, masters, vectors, normal, gap, area, share, covered } = pair;
+    let ContactPair { contact, slave, part, slaves, masters, vectors, normal, gap, area, limit_area, covered } = pair;
     message.extend([number as u64, *contact as u64, *slave, u64::from(*part), u64::from(*covered)]);
     message.extend([slaves.len(), masters.len(), vectors.len()].map(|n| n as u64));
-    message
-        .extend(normal.iter().chain([gap, area, share]).chain(&site.place).chain([&site.facet]).map(|x| x.to_bits()));
+    message.extend(
+        normal.iter().chain([gap, area, limit_area]).chain(&site.place).chain([&site.facet]).map(|x| x.to_bits()),
+    );
     message.extend(slaves.iter().chain(masters).flat_map(|(node, weight)| [*node, weight.to_bits()]));
     message.extend(vectors.iter().flatten().map(|x| x.to_bits()));
 }

@@ -55,7 +55,7 @@ pub fn conditions(contact: usize, slave: &GatheredSurface, master: &GatheredSurf
             normal: normals[k],
             gap,
             area,
-            share: shares[k],
+            limit_area: shares[k],
             covered: true,
         });
     }

@@ -59,7 +59,7 @@ pub struct ContactPair {
     pub area: f64,
     /// Area of the limit of friction: where nodes match, and at obstacles, all of the slave surface that belongs to the node (area).
     /// Else `area`.
-    pub share: f64,
+    pub limit_area: f64,
     /// Whether the node has the other side opposite; else the condition is at the edge of the other side, near it.
     pub covered: bool,
 }

@@ -155,7 +155,7 @@ pub fn conditions(
             masters: masters.iter().map(|(&node, weight)| (node, weight.size / whole)).collect(),
             normal,
             area,
-            share: area,
+            limit_area: area,
             covered: reach[node] >= AT_THE_EDGE,
         }
     };

@@ -42,8 +42,9 @@ pub fn pair(
     let pairs = own.filter_map(|(_, (((&slave, &point), (outward, area)), &part))| {
         let (normal, gap) = approach(obstacle, point, outward)?;
         let (slaves, masters, vectors) = (vec![(slave, 1.0)], Vec::new(), Vec::new());
-        let (share, covered) = (area, true);
-        let pair = ContactPair { contact, slave, part, slaves, masters, vectors, normal, gap, area, share, covered };
+        let (limit_area, covered) = (area, true);
+        let pair =
+            ContactPair { contact, slave, part, slaves, masters, vectors, normal, gap, area, limit_area, covered };
         (dot(normal, outward) > FACING).then_some(pair)
     });
     let mut pairs = quadratic::conditions(surface, pairs.collect());
@@ -52,7 +53,7 @@ pub fn pair(
         let same = (next.slave, next.normal) == (first.slave, first.normal)
             && (&next.slaves, &next.vectors) == (&first.slaves, &first.vectors);
         if same {
-            (first.area, first.share) = (first.area + next.area, first.share + next.share);
+            (first.area, first.limit_area) = (first.area + next.area, first.limit_area + next.limit_area);
         }
         same
     });

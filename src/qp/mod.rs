@@ -9,7 +9,6 @@
 //! - [`pcpg`]: equalities only, with all search directions kept;
 //! - [`active_set`]: guesses the active bounds, solves for equalities, corrects the guess: fast, but without a proof;
 //! - [`slides`]: discs in active sets;
-//! - [`nnls`]: small dense nonnegative least squares: whether a force can be made of pushes;
 //! - [`power`]: estimate of the norm of P A P that the penalty and the step lengths are scaled by.
 //!
 //! A solver never fails with an error: it ends with an [`Outcome`] and the best it has.
@@ -18,7 +17,6 @@ pub mod active_set;
 pub mod discs;
 pub mod feasible;
 pub mod mprgp;
-pub mod nnls;
 pub mod pcpg;
 pub mod power;
 pub mod quadratic;
@@ -112,7 +110,7 @@ impl Limits {
 }
 
 /// `y = y + a x`.
-fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
     work::each(x.len(), 2, size_of::<f64>());
     for (y, x) in y.iter_mut().zip(x) {
         *y += a * x;

@@ -89,7 +89,7 @@ impl<'a> Known<'a> {
         let rubbed = states.iter().filter_map(|state| {
             let Rubbing { force, total, is_given, .. } = state.friction?;
             let pair = &pairs[state.pair];
-            let area = if is_given { pair.share } else { pair.area };
+            let area = if is_given { pair.limit_area } else { pair.area };
             Some((state.pair, [force.map(|f| f / area), total]))
         });
         let rubbed = rubbed.collect();

@@ -215,3 +215,45 @@ fn without_pressure_there_is_no_friction() {
     assert_eq!(run.code, 1, "nothing holds the block along y: {}", run.stdout);
     assert!(run.stdout.contains("nothing balances the loads on a body"), "{}", run.stdout);
 }
+
+/// Tresca's limit acts where surfaces are opposite, whichever is the slave: on 1000 - 330 by 600 - 2 * 70 here, which ends within
+/// faces on either side.
+#[test]
+fn what_overhangs_is_not_rubbed() {
+    let directory = tempfile::tempdir().unwrap();
+    for element in ["tet4", "hex8", "tet10"] {
+        for sides in [["upper.zmin", "lower.zmax"], ["lower.zmax", "upper.zmin"]] {
+            let text = format!(
+                r#"
+                [material.steel]
+                young = 210000.0
+                poisson = 0.3
+                [body.lower]
+                material = "steel"
+                element = "{element}"
+                brick = {{ origin = [0.0, 0.0, 0.0], size = [1000.0, 600.0, 200.0], cells = [5, 3, 1] }}
+                [body.upper]
+                material = "steel"
+                element = "{element}"
+                brick = {{ origin = [330.0, 70.0, 200.0], size = [1000.0, 460.0, 200.0], cells = [4, 3, 1] }}
+                [support.floor]
+                surface = "lower.zmin"
+                fix = ["x", "y", "z"]
+                [support.top]
+                surface = "upper.zmax"
+                fix = ["x", "y", "z"]
+                displacement = [20.0, 0.0, -0.1]
+                [contact.joint]
+                slave = "{}"
+                master = "{}"
+                shear_limit = 30.0
+                "#,
+                sides[0], sides[1]
+            );
+            let summary = solve_tightly(2, &scene_file(directory.path(), &text), &[]).summary();
+            let force = vector(&summary["friction"]["joint"]["force"]);
+            let size = 30.0 * (1000.0 - 330.0) * (600.0 - 2.0 * 70.0);
+            assert_close(&format!("{element}, slave {}", sides[0]), force[0].abs(), size, 1e-4);
+        }
+    }
+}

@@ -14,10 +14,10 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::Coarse;
+use super::nnls;
 use crate::constraint::Constraints;
 use crate::constraint::friction::Slider;
 use crate::feti::dual::space::RowSpace;
-use crate::qp::nnls;
 use crate::scene::Friction;
 use crate::vector::{dot, length};
 
@@ -62,7 +62,7 @@ impl Cones {
             let slider = of_row.get(&row)?;
             let (factor, group) = match friction[slider.contact]? {
                 Friction::Coulomb(coefficient) => (coefficient, -1.0),
-                Friction::Tresca(limit) => (limit * slider.share, slider.contact as f64),
+                Friction::Tresca(limit) => (limit * slider.limit_area, slider.contact as f64),
             };
             let mut numbers = unit_force(row, 1.0);
             for k in 0..2 {

@@ -13,10 +13,10 @@
 use super::Coarse;
 use super::bodies::{BodyMotions, Motion};
 use super::cones::{Balance, CUTS, Cones, unit};
+use super::nnls;
 use crate::constraint::Constraints;
 use crate::feti::dual::space::RowSpace;
 use crate::feti::inverse::kernel::MODES;
-use crate::qp::nnls;
 use crate::scene::Friction;
 use crate::span::complement;
 use crate::vector::{dot, length};

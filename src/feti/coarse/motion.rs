@@ -4,10 +4,10 @@
 //! Such motions change no force: nothing drives them. They are found as a least distance, see [`nnls::least_distance`].
 
 use super::face::CoarseFace;
+use super::nnls;
 use crate::constraint::Constraints;
 use crate::feti::coarse::Coarse;
 use crate::feti::dual::space::RowSpace;
-use crate::qp::nnls;
 
 /// The amplitudes `a` of all clusters' modes that make `residual - G'a` smallest on the kept rows and, if that leaves a
 /// choice, nowhere positive on the other contacts, where that is possible. Collective.
