@@ -30,7 +30,8 @@ impl GatheredSurface {
         };
         let mut all: Vec<_> = sums.into_iter().map(parts).collect();
         if !self.quadratic.is_empty() {
-            all.iter_mut().zip(quadratic::areas(self, |_| true)).for_each(|((_, sum), area)| *sum = area);
+            let areas = quadratic::areas(self, quadratic::SHARE, |_| true);
+            all.iter_mut().zip(areas).for_each(|((_, sum), area)| *sum = area);
         }
         all
     }
@@ -38,7 +39,7 @@ impl GatheredSurface {
     /// As [`Self::normals_and_areas`], but of the faces alone whose nodes are all `covered`.
     pub fn covered_areas(&self, normals: &[[f64; 3]], covered: impl Fn(usize) -> bool) -> Vec<f64> {
         if !self.quadratic.is_empty() {
-            return quadratic::areas(self, |face| face.iter().all(|&node| covered(node)));
+            return quadratic::areas(self, quadratic::SHARE, |face| face.iter().all(|&node| covered(node)));
         }
         let mut areas = vec![0.0; self.nodes.len()];
         for (triangle, vector) in self.triangles.iter().zip(self.area_vectors()) {

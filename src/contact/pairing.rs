@@ -78,7 +78,7 @@ impl Pairing<'_> {
         let mut found = matching::conditions(self.contact, one, &opposite, facing?);
         if slave.is_quadratic && master.is_quadratic {
             let count = found.pairs.len();
-            found.pairs = quadratic::conditions(one, found.pairs);
+            found.pairs = quadratic::conditions(one, quadratic::SHARE, found.pairs);
             assert_eq!(found.pairs.len(), count, "covered faces have all their corners");
         }
         [found.count] = sums(self.comm, [found.masters.len() as u64]).map(|count| count as usize);

@@ -13,6 +13,11 @@
 //! here, each along its own normal: that of a middle is the coefficient `(n_m . u_m - s (n_a . u_a + n_b . u_b)) / (1 - 2 s)` of the
 //! displacements along the normals. So a constant pressure acts along the normals of a curved surface, and all nodes meet a distance that is
 //! prescribed along these; [`super::mortar`] is for meshes that do not match.
+//!
+//! Where distances are bent, as under a ball, `s` should be small ([`SHARE_WHERE_BENT`]): a middle that would touch while both corners
+//! are `d` away is held `2 s d` away. Where it is very small so are the areas of corners, and their pressures are noisy. Under a rigid ball
+//! energies were 11.0, 6.1 and 4.0 % off on the first mesh with 0.2, 0.1 and 0.05, pressures at nodes 5.6, 3.5 and 5.6 % in the mean on a
+//! finer one. On a plane all are as exact, and friction takes fewer iterations with 0.2.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -23,10 +28,13 @@ use crate::vector::{difference, length};
 /// What a corner gets of the function of an edge's middle.
 pub const SHARE: f64 = 0.2;
 
+/// The same where distances are bent.
+pub const SHARE_WHERE_BENT: f64 = 0.1;
+
 /// Area that belongs to the condition of each node, of the faces that count: of a corner the integral of its function, `2/3 s A`
 /// of each face `A`, of a middle the integral of its own, `(1 - 2 s) A / 3`.
-pub(super) fn areas(surface: &GatheredSurface, counts: impl Fn(&[usize; 6]) -> bool) -> Vec<f64> {
-    let [of_corner, of_middle] = [2.0 * SHARE, 1.0 - 2.0 * SHARE];
+pub(super) fn areas(surface: &GatheredSurface, share: f64, counts: impl Fn(&[usize; 6]) -> bool) -> Vec<f64> {
+    let [of_corner, of_middle] = [2.0 * share, 1.0 - 2.0 * share];
     let mut areas = vec![0.0; surface.nodes.len()];
     let of_triangles: Vec<f64> = surface.corners().map(|corners| crate::mesh::surface::area(&corners)).collect();
     for (face, parts) in surface.quadratic.iter().zip(of_triangles.chunks_exact(4)).filter(|(face, _)| counts(face)) {
@@ -38,7 +46,7 @@ pub(super) fn areas(surface: &GatheredSurface, counts: impl Fn(&[usize; 6]) -> b
 }
 
 /// From conditions on nodes to those on coefficients. Middles of which a corner has no condition have none either.
-pub fn conditions(slave: &GatheredSurface, pairs: Vec<ContactPair>) -> Vec<ContactPair> {
+pub fn conditions(slave: &GatheredSurface, share: f64, pairs: Vec<ContactPair>) -> Vec<ContactPair> {
     let mut ends: BTreeMap<(u64, u32), [(u64, u32); 2]> = BTreeMap::new();
     for face in &slave.quadratic {
         let nodes = face.map(|node| (slave.nodes[node], slave.parts[node]));
@@ -51,8 +59,8 @@ pub fn conditions(slave: &GatheredSurface, pairs: Vec<ContactPair>) -> Vec<Conta
     let of_node: HashMap<(u64, u32), &ContactPair> = pairs.iter().map(|pair| ((pair.slave, pair.part), pair)).collect();
     let condition = |pair: &ContactPair| {
         let Some([a, b]) = ends.get(&(pair.slave, pair.part)) else { return Some(pair.clone()) };
-        let (own, share) = (1.0 / (1.0 - 2.0 * SHARE), -SHARE / (1.0 - 2.0 * SHARE));
-        let parts = [(pair, own), (*of_node.get(a)?, share), (*of_node.get(b)?, share)];
+        let (own, other) = (1.0 / (1.0 - 2.0 * share), -share / (1.0 - 2.0 * share));
+        let parts = [(pair, own), (*of_node.get(a)?, other), (*of_node.get(b)?, other)];
         let weighted = |nodes: fn(&ContactPair) -> &Vec<(u64, f64)>| {
             parts.iter().flat_map(|(of, factor)| nodes(of).iter().map(move |(node, w)| (*node, factor * w))).collect()
         };
@@ -99,7 +107,7 @@ mod tests {
     fn a_constant_pressure_passes_exactly() {
         let (slave, master) = (square(0.3, 100, true), square(0.0, 0, false));
         let pairs = matching::pair(0, &slave, &master).expect("they match").pairs;
-        let pairs = conditions(&slave, pairs);
+        let pairs = conditions(&slave, SHARE, pairs);
         assert_eq!(pairs.len(), 9);
         let mut forces = [[0.0; 9]; 2];
         for pair in &pairs {
@@ -135,7 +143,7 @@ mod tests {
         let (slave, master) = (round(0.0, 100, true), round(0.0, 0, false));
         let pairs = matching::pair(0, &slave, &master).expect("they match").pairs;
         let normals: BTreeMap<u64, [f64; 3]> = pairs.iter().map(|pair| (pair.slave, pair.normal)).collect();
-        let found = conditions(&slave, pairs);
+        let found = conditions(&slave, SHARE, pairs);
         assert_eq!(found.iter().filter(|pair| !pair.vectors.is_empty()).count(), 5, "middles");
         let mut forces: BTreeMap<u64, [f64; 3]> = BTreeMap::new();
         for pair in &found {
@@ -161,7 +169,7 @@ mod tests {
         let (slave, master) = (square(0.3, 100, true), square(0.0, 0, false));
         let mut pairs = matching::pair(0, &slave, &master).expect("they match").pairs;
         pairs.retain(|pair| pair.slave != 100);
-        let left = conditions(&slave, pairs);
+        let left = conditions(&slave, SHARE, pairs);
         assert_eq!(left.iter().map(|pair| pair.slave).collect::<Vec<_>>(), [102, 105, 106, 107, 108]);
     }
 }

@@ -37,7 +37,12 @@ pub fn pair(
     surface: &GatheredSurface,
     obstacle: &Obstacle,
 ) -> Result<Conditions, ContactError> {
-    let nodes = surface.nodes.iter().zip(&surface.points).zip(surface.normals_and_areas());
+    let mut normals = surface.normals_and_areas();
+    if !surface.quadratic.is_empty() {
+        let areas = quadratic::areas(surface, share(obstacle), |_| true);
+        normals.iter_mut().zip(areas).for_each(|((_, own), area)| *own = area);
+    }
+    let nodes = surface.nodes.iter().zip(&surface.points).zip(normals);
     let own = nodes.zip(&surface.parts).enumerate().filter(|(index, _)| surface.layer(*index) == Layer::Own);
     let pairs = own.filter_map(|(_, (((&slave, &point), (outward, area)), &part))| {
         let (normal, gap) = approach(obstacle, point, outward)?;
@@ -47,7 +52,7 @@ pub fn pair(
             ContactPair { contact, slave, part, slaves, masters, vectors, normal, gap, area, limit_area, covered };
         (dot(normal, outward) > FACING).then_some(pair)
     });
-    let mut pairs = quadratic::conditions(surface, pairs.collect());
+    let mut pairs = quadratic::conditions(surface, share(obstacle), pairs.collect());
     // What is left of several parts of a node is one condition if it says the same.
     pairs.dedup_by(|next, first| {
         let same = (next.slave, next.normal) == (first.slave, first.normal)
@@ -65,6 +70,11 @@ pub fn pair(
         return Err(ContactError::LooksAway { name: name.to_owned(), slaves });
     }
     Ok(Conditions { pairs, count, ..Conditions::default() })
+}
+
+/// What corners of quadratic faces get of the functions of middles.
+pub fn share(obstacle: &Obstacle) -> f64 {
+    if matches!(obstacle, Obstacle::Plane { .. }) { quadratic::SHARE } else { quadratic::SHARE_WHERE_BENT }
 }
 
 /// The unit direction from a point straight into the obstacle, and the distance (negative inside). Where all directions

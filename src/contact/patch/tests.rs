@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 
 use super::*;
 use crate::contact::pairing::Rule;
-use crate::contact::{Conditions, ContactPair, MasterNode, matching, mortar};
+use crate::contact::{Conditions, ContactPair, MasterNode, matching, mortar, quadratic};
 use crate::fixture::{RANKS, Setup, not_matching, on_ranks, two_bricks, two_bricks_by_metis, two_meshes};
 use crate::scene::Scene;
 
@@ -65,7 +65,7 @@ fn whole(setup: &Setup) -> (Conditions, Rule) {
         |index: usize| GatheredSurface::gather(setup.comm, setup.subdomains(), discrete.contacts.surfaces[index]);
     let (slave, master) = (gather(0), gather(1));
     if let Some(found) = matching::pair(0, &slave, &master) {
-        let pairs = crate::contact::quadratic::conditions(&slave, found.pairs);
+        let pairs = quadratic::conditions(&slave, quadratic::SHARE, found.pairs);
         return (Conditions { pairs, ..found }, Rule::NodeToNode);
     }
     let interface = &discrete.decomposition.interface;
