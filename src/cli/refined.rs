@@ -166,6 +166,7 @@ impl Run<'_> {
                 largest(|state| state.energy.map(f64::abs)).unwrap_or_default()
             },
             distance: marking::total(self.comm, &parts(discrete, solved, &ErrorOf::Energy, increments)),
+            consistency: steps.iter().filter_map(|step| step.consistency).fold(0.0, f64::max),
             gap: largest(|state| state.errors.duality_gap).unwrap_or_default(),
             stress: largest(|state| state.errors.discretisation).unwrap_or(f64::MAX),
             limit_load,

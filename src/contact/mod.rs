@@ -10,6 +10,7 @@
 
 pub mod areas;
 pub mod clip;
+pub mod consistency;
 pub mod corner;
 pub mod dual;
 pub mod edge;

@@ -54,12 +54,16 @@ const BENT: f64 = 1e-6;
 const AT_THE_EDGE: f64 = 1.0 - 1e-3;
 
 /// The covered part of a slave face.
-struct Part<'a> {
+pub(super) struct Part<'a> {
+    /// Which of the surface's faces.
+    pub number: usize,
     /// Its nodes, corners first.
-    face: &'a [usize],
+    pub face: &'a [usize],
     /// Whether it is an own one.
-    own: bool,
-    seen: Seen,
+    pub own: bool,
+    pub seen: Seen,
+    /// Integrals of products of linear functions.
+    pub mass: [[f64; 3]; 3],
     /// Functions of the corners at the places of their multipliers; `None` where these are the corners.
     places: Option<[[f64; 3]; 3]>,
     /// Cosines between its normal and those of its corners.
@@ -198,10 +202,14 @@ fn merged(weights: impl Iterator<Item = (u64, Weight)>) -> BTreeMap<u64, Weight>
 }
 
 /// The covered parts of all slave faces that have any.
-fn parts<'a>(slave: &'a GatheredSurface, master: &GatheredSurface, normals: &[([f64; 3], f64)]) -> Vec<Part<'a>> {
+pub(super) fn parts<'a>(
+    slave: &'a GatheredSurface,
+    master: &GatheredSurface,
+    normals: &[([f64; 3], f64)],
+) -> Vec<Part<'a>> {
     let opposite = Opposite::new(slave, master);
     let corners: Vec<_> = slave.corners().collect();
-    let part = |Face { nodes, triangles }: Face<'a>| {
+    let part = |(number, Face { nodes, triangles }): (usize, Face<'a>)| {
         let mut seen = Seen::default();
         let own = slave.owns(triangles.start);
         triangles.for_each(|k| opposite.add(slave, k, &corners[k], &mut seen));
@@ -211,15 +219,16 @@ fn parts<'a>(slave: &'a GatheredSurface, master: &GatheredSurface, normals: &[([
         let mean = |k: usize| seen.points.iter().map(|point| point.area * point.at[k]).sum::<f64>() / area;
         let places = edge::places(&seen.corners, [0, 1, 2].map(mean));
         let cosines = ends.map(|node| dot(normals[node].0, along));
-        let is_bent = nodes.len() > 3 && is_bent(nodes, &seen.points, along, [slave, master]);
-        Some(Part { face: nodes, own, seen, places, cosines, is_bent })
+        let mass = mass(&seen.points);
+        let is_bent = nodes.len() > 3 && is_bent((nodes, &mass), &seen.points, along, [slave, master]);
+        Some(Part { number, face: nodes, own, seen, mass, places, cosines, is_bent })
     };
-    faces(slave).filter_map(part).collect()
+    faces(slave).enumerate().filter_map(part).collect()
 }
 
 /// Whether the distance along a direction is no linear function on the covered part of a face.
 fn is_bent(
-    face: &[usize],
+    (face, mass): (&[usize], &[[f64; 3]; 3]),
     points: &[IntegrationPoint],
     along: [f64; 3],
     [slave, master]: [&GatheredSurface; 2],
@@ -230,7 +239,7 @@ fn is_bent(
     let distance = |point: &IntegrationPoint| place(master, &point.masters) - place(slave, &functions(face, point.at));
     let distances: Vec<f64> = points.iter().map(distance).collect();
     let of_corner = |k: usize| points.iter().zip(&distances).map(|(point, d)| point.area * point.at[k] * d).sum();
-    let (inverse, integrals) = (dual::invert(&mass(points)), [0, 1, 2].map(of_corner));
+    let (inverse, integrals) = (dual::invert(mass), [0, 1, 2].map(of_corner));
     let linear = inverse.map(|row| dot(row, integrals));
     let off = |(point, d): (&IntegrationPoint, &f64)| point.area * (d - dot(linear, point.at)).powi(2);
     let area: f64 = points.iter().map(|point| point.area).sum();
@@ -335,30 +344,29 @@ fn add(
 }
 
 /// The direction of a sum of weighted vectors.
-fn mean(vectors: impl Iterator<Item = ([f64; 3], f64)>) -> Option<[f64; 3]> {
+pub(super) fn mean(vectors: impl Iterator<Item = ([f64; 3], f64)>) -> Option<[f64; 3]> {
     let add = |sum: [f64; 3], (vector, weight): ([f64; 3], f64)| std::array::from_fn(|a| sum[a] + weight * vector[a]);
     unit(vectors.fold([0.0; 3], add))
 }
 
 /// The multipliers' functions on a part, and their integrals with the linear functions of the face.
-fn dual_functions(Part { seen, places, is_bent, .. }: &Part, active: [bool; 3]) -> DualFunctions {
-    let mass = mass(&seen.points);
+pub(super) fn dual_functions(Part { mass, places, is_bent, .. }: &Part, active: [bool; 3]) -> DualFunctions {
     let functions = |mass: &[[f64; 3]; 3]| {
         let dual = dual::functions(mass, active)?;
         Some(if *is_bent { dual.even(dual::positive(mass, active)) } else { dual })
     };
     let Some(places) = places else {
-        return functions(&mass).unwrap_or_else(|| dual::positive(&mass, active));
+        return functions(mass).unwrap_or_else(|| dual::positive(mass, active));
     };
     // `phi* = S phi` with `S = T^-T`, so `phi = T^T phi*`.
     let inverse = dual::invert(places);
-    let moved = dual::multiply(&dual::multiply(&dual::transpose(&inverse), &mass), &inverse);
+    let moved = dual::multiply(&dual::multiply(&dual::transpose(&inverse), mass), &inverse);
     match functions(&moved) {
         Some(DualFunctions { functions, slave }) => DualFunctions {
             functions: dual::multiply(&functions, &dual::transpose(&inverse)),
             slave: dual::multiply(&slave, places),
         },
-        None => dual::positive(&mass, active),
+        None => dual::positive(mass, active),
     }
 }
 

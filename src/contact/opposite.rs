@@ -67,7 +67,7 @@ pub(super) fn faces(surface: &GatheredSurface) -> impl Iterator<Item = Face<'_>>
 }
 
 /// A place in a triangle as one in the face that it is part of.
-fn in_face(surface: &GatheredSurface, triangle: usize, at: [f64; 3]) -> [f64; 3] {
+pub(super) fn in_face(surface: &GatheredSurface, triangle: usize, at: [f64; 3]) -> [f64; 3] {
     if surface.quadratic.is_empty() {
         return at;
     }

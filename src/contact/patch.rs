@@ -10,9 +10,9 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::smooth;
 use super::surface::{GatheredSurface, Layer, PartOf};
 use super::tree::BallTree;
+use super::{opposite, smooth};
 use crate::comm::exact::exact_sums;
 use crate::comm::{Comm, all_gather_u64};
 use crate::decomposition::Decomposition;
@@ -123,6 +123,14 @@ impl Patch {
         let nothing = || BallTree::new(&[]);
         let (own, tree, face_of, boxes, rank_of) = (Vec::new(), nothing(), Vec::new(), nothing(), Vec::new());
         Self { surface, is_quadratic, own, tree, face_of, boxes, rank_of }
+    }
+
+    /// Own faces: which of the faces that are here, of which subdomain, and which of its facets.
+    pub fn own(&self) -> impl Iterator<Item = (usize, usize, usize)> {
+        let numbers = opposite::faces(&self.surface).enumerate();
+        let numbers = numbers.filter(|(_, face)| self.surface.owns(face.triangles.start)).map(|(number, _)| number);
+        let places = self.own.iter().map(|face| ((face.key >> 32) as usize, (face.key & u64::from(u32::MAX)) as usize));
+        numbers.zip(places).map(|(number, (subdomain, facet))| (number, subdomain, facet))
     }
 
     /// The faces of all ranks that have a triangle near one of these lines. Collective.

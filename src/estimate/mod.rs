@@ -24,6 +24,7 @@
 //! whose patches know nothing of that, is rather too large; if elements lie across it, rather too small.
 
 pub mod bregman;
+pub mod contact;
 mod polynomial;
 mod recovery;
 mod rule;

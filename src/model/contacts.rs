@@ -8,7 +8,7 @@ use crate::constraint::{Support, dirichlet};
 use crate::contact::known::{Found, Pairs, spread};
 use crate::contact::pairing::{Pairing, Rule};
 use crate::contact::patch::Patch;
-use crate::contact::{ContactError, ContactPair, MasterNode, corner, rigid, sagitta};
+use crate::contact::{ContactError, ContactPair, MasterNode, corner, quadratic, rigid, sagitta};
 use crate::decomposition::Decomposition;
 use crate::record::counts::ContactRow;
 use crate::scene::{Contact, Scene, Sides, SurfaceName};
@@ -18,8 +18,8 @@ use crate::scene::{Contact, Scene, Sides, SurfaceName};
 pub struct Contacts {
     /// Their names.
     pub names: Vec<String>,
-    /// Indices of the surfaces in contact, contact by contact.
-    pub surfaces: Vec<usize>,
+    /// What touches in each of them.
+    pub surfaces: Vec<Surfaces>,
     /// Pairs of all contacts: those of the rows that this rank holds.
     pub pairs: Pairs,
     /// Own nodes of master surfaces that have slaves opposite, by the numbers of these pairs.
@@ -30,6 +30,31 @@ pub struct Contacts {
     pub rows: Vec<ContactRow>,
     /// Whether any has friction, in any step.
     pub has_friction: bool,
+}
+
+/// The surfaces of a contact, by their indices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surfaces {
+    /// That of the conditions.
+    pub slave: usize,
+    /// The other one; none at a rigid obstacle.
+    pub master: Option<usize>,
+    /// Whether conditions are means over faces of the master.
+    pub is_mortar: bool,
+    /// What corners of quadratic faces get of the functions of middles, where nodes have conditions.
+    pub share: f64,
+}
+
+impl Contacts {
+    /// How many surfaces are in contact, once for each contact.
+    pub fn surfaces(&self) -> usize {
+        self.surfaces.iter().map(|of| 1 + usize::from(of.master.is_some())).sum()
+    }
+
+    /// Whether a surface is in contact with anything.
+    pub fn touch(&self, surface: usize) -> bool {
+        self.surfaces.iter().any(|of| of.slave == surface || of.master == Some(surface))
+    }
 }
 
 /// What contacts are made of.
@@ -56,13 +81,13 @@ pub(super) fn pair(
     let mut all = Contacts {
         names: scene.contact.keys().cloned().collect(),
         has_friction: scene.contact.iter().any(|(name, contact)| contact.rubs(name, scene.steps())),
-        surfaces: scene.contact.values().flat_map(Contact::surfaces).map(&index).collect(),
         ..Contacts::default()
     };
     let (mut found, mut warnings) = (Vec::new(), Vec::new());
     for (number, (name, contact)) in scene.contact.iter().enumerate() {
-        let (of_contact, row, told) = one(comm, given, (number, name, contact), &index)?;
+        let (of_contact, touching, row, told) = one(comm, given, (number, name, contact), &index)?;
         found.push(of_contact);
+        all.surfaces.push(touching);
         all.rows.push(row);
         warnings.extend(told);
     }
@@ -79,13 +104,13 @@ pub(super) fn pair(
     Ok((all, warnings))
 }
 
-/// One contact: its conditions, how they were found, and what to tell of it. Collective.
+/// One contact: its conditions, what touches, how they were found, and what to tell of it. Collective.
 fn one(
     comm: &dyn Comm,
     &Given { scene, decomposition, supports, extents, .. }: &Given,
     (number, name, contact): (usize, &String, &Contact),
     index: impl Fn(&SurfaceName) -> usize,
-) -> Result<(Found, ContactRow, Vec<String>), ContactError> {
+) -> Result<(Found, Surfaces, ContactRow, Vec<String>), ContactError> {
     let held = |nodes: &[u64]| dirichlet::fixed_at(comm, &decomposition.interface, supports, nodes);
     let pairing = Pairing { comm, contact: number, name, held: &held };
     let patch = |s| (s, Patch::new(comm, decomposition, index(s)));
@@ -114,6 +139,16 @@ fn one(
     let extent = |body: &String| &extents[scene.body.keys().position(|known| known == body).expect("it exists")];
     let bodies: Vec<_> = surfaces.iter().map(|(surface, _)| (&surface.body, extent(&surface.body))).collect();
     warnings.extend(extent::overlap(comm, name, pairs, &sites, &bodies));
+    let [slave_index, master_index] = [slave, 1 - slave].map(|k| surfaces.get(k).map(|(surface, _)| index(surface)));
+    let touching = Surfaces {
+        slave: slave_index.expect("a contact has a surface"),
+        master: master_index,
+        is_mortar: rule == rule_name(Rule::Mortar),
+        share: match &contact.sides {
+            Sides::Rigid { obstacle, .. } => rigid::share(obstacle),
+            _ => quadratic::SHARE,
+        },
+    };
     let row = ContactRow {
         name: name.clone(),
         slave: surfaces[slave].0.to_string(),
@@ -124,7 +159,7 @@ fn one(
     let tells =
         |pair: &ContactPair| patch.surface.index(pair.slave, pair.part).is_some_and(|index| patch.surface.tells(index));
     let told = pairs.iter().map(tells).collect();
-    Ok((Found { conditions, sites, told }, row, warnings))
+    Ok((Found { conditions, sites, told }, touching, row, warnings))
 }
 
 fn rule_name(rule: Rule) -> &'static str {

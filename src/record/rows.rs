@@ -25,6 +25,9 @@ pub struct StepRow {
     /// The number whose error is asked for.
     #[serde(default)]
     pub goal: Option<GoalRow>,
+    /// What conditions of contact add to the distance of the energy, where meshes are refined (energy).
+    #[serde(default)]
+    pub consistency: Option<f64>,
     /// The state there.
     #[serde(flatten)]
     pub state: State,
@@ -123,8 +126,11 @@ pub struct RefinementRow {
     pub energy: f64,
     /// What errors of the energy are relative to: the largest `|J(u)|` of an increment.
     pub size: f64,
-    /// Sum of the Bregman distances (energy), which the error of the energy is estimated from.
+    /// Sum of the Bregman distances and of what conditions of contact add (energy), which the error of the energy is estimated from.
     pub distance: f64,
+    /// What conditions of contact have of it; the largest of an increment.
+    #[serde(default)]
+    pub consistency: f64,
     /// `J(u)` is at most so much above its least value on this mesh.
     pub gap: f64,
     /// Estimated error of the stress, relative.

@@ -21,7 +21,7 @@ pub fn sizes(discrete: &Discrete, comm: &dyn Comm) -> Sizes {
     let space = RowSpace::new(comm, &decomposition.shares, constraints);
     let mut partial = Vec::new();
     for (rows, subdomain) in space.owned().iter().zip(&decomposition.subdomains) {
-        let touches = subdomain.facets.iter().any(|facet| discrete.contacts.surfaces.contains(&facet.surface));
+        let touches = subdomain.facets.iter().any(|facet| discrete.contacts.touch(facet.surface));
         let mut counts = [subdomain.dofs() as f64, 0.0, 0.0, 0.0, 0.0, f64::from(touches)];
         for row in rows.clone() {
             counts[match constraints.rows[row].kind {
@@ -88,7 +88,7 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
         subdomains,
         coarse_blocks,
         conditions: [contacts.pairs.total() as f64 - coupled, coupled],
-        surfaces: contacts.surfaces.len() as f64,
+        surfaces: contacts.surfaces() as f64,
         largest,
     };
     let items = held.items();

@@ -83,7 +83,9 @@ pub(super) fn measure(
         _ => None,
     };
     let owned = problem.space.owned();
-    let of_nodes = displacements(comm, discrete, u, owned.iter().cloned().flatten().filter_map(closed));
+    let pairs = owned.iter().cloned().flatten().filter_map(closed).map(|pair| &discrete.contacts.pairs[pair]);
+    let nodes = pairs.flat_map(|pair| pair.slaves.iter().chain(&pair.masters).map(|(node, _)| *node));
+    let of_nodes = displacements(comm, discrete, u, nodes);
     let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
     let subdomains = problem.subdomains.iter().zip(u).zip(owned);
     for ((subdomain, u), rows) in subdomains {
@@ -141,13 +143,13 @@ fn add_contact(
     discrete: &Discrete,
     index: usize,
     at: At,
-    of_nodes: &HashMap<[u64; 1], Vec<u64>>,
+    of_nodes: &HashMap<u64, [f64; 3]>,
 ) {
     let (pair, Site { place, facet }) = (&discrete.contacts.pairs[index], discrete.contacts.pairs.site(index));
     let (name, contact) = scene.contact.iter().nth(pair.contact).expect("a pair belongs to a contact");
     let moved = contact.displacement().map(|d| -d * obstacle_factor(scene, name, at));
     let motion = pair.nodes().fold(moved, |sum, (node, weight)| {
-        let u = of_nodes.get(&[node]).map_or([0.0; 3], |u| std::array::from_fn(|a| f64::from_bits(u[a])));
+        let u = of_nodes.get(&node).copied().unwrap_or_default();
         std::array::from_fn(|a| sum[a] + weight * u[a])
     });
     let along = dot(motion, pair.normal);
@@ -167,27 +169,24 @@ fn obstacle_factor(scene: &Scene, name: &str, at: At) -> f64 {
     begin + at.fraction * (end - begin)
 }
 
-/// Displacements, as bits, of the nodes of these pairs, those of the first subdomain that has a face there. Collective.
-fn displacements(
+/// Displacements of these nodes of surfaces in contact, those of the first subdomain that has a face there. Collective.
+pub(super) fn displacements(
     comm: &dyn Comm,
     discrete: &Discrete,
     u: &Torn,
-    pairs: impl Iterator<Item = usize>,
-) -> HashMap<[u64; 1], Vec<u64>> {
+    nodes: impl Iterator<Item = u64>,
+) -> HashMap<u64, [f64; 3]> {
     let mut mine = Vec::new();
     for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(u) {
-        let facets = subdomain.facets.iter().filter(|facet| discrete.contacts.surfaces.contains(&facet.surface));
+        let facets = subdomain.facets.iter().filter(|facet| discrete.contacts.touch(facet.surface));
         let nodes: BTreeSet<u32> = facets.flat_map(|facet| facet.nodes.iter().copied()).collect();
         for node in nodes.into_iter().map(|node| node as usize) {
             let bits = u[3 * node..3 * node + 3].iter().map(|x| x.to_bits()).collect();
             mine.push(([subdomain.nodes[node]], bits));
         }
     }
-    let nodes = pairs.flat_map(|pair| {
-        let pair = &discrete.contacts.pairs[pair];
-        pair.slaves.iter().chain(&pair.masters).map(|(node, _)| [*node])
-    });
-    look_up(comm, mine, nodes.collect::<BTreeSet<[u64; 1]>>())
+    let found = look_up(comm, mine, nodes.map(|node| [node]).collect::<BTreeSet<[u64; 1]>>());
+    found.into_iter().map(|([node], bits)| (node, std::array::from_fn(|a| f64::from_bits(bits[a])))).collect()
 }
 
 /// The rounding of coordinates over the largest stretch of a body. It matters to contacts only.

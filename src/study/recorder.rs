@@ -1,14 +1,19 @@
 //! What is written of each increment that is reached: its fields, its row, and the contacts that are closed in the end.
 
+use std::collections::HashMap;
+
+use super::contact::ContactState;
 use super::goal::Goal;
-use super::{fields, report};
-use crate::comm::Comm;
+use super::{fields, limits, report};
+use crate::comm::{Comm, exact};
+use crate::contact::consistency::State;
 use crate::decomposition::Subdomain;
 use crate::estimate::bregman;
+use crate::estimate::contact::Touching;
 use crate::model::Discrete;
 use crate::monitor::timing::Timer;
 use crate::newton::{self, Newton, Snapshot};
-use crate::record::rows::{GoalRow, StepRow};
+use crate::record::rows::StepRow;
 use crate::restart::Standing;
 use crate::results::piece::Piece;
 use crate::scene::{Moved, Scene};
@@ -20,6 +25,8 @@ pub(super) struct Recorder<'a> {
     comm: &'a dyn Comm,
     /// The number whose error is asked for.
     goal: Option<Goal>,
+    /// The contacts, if meshes are refined.
+    touching: Vec<Touching>,
     /// This rank's mesh and fields.
     pub piece: Piece,
     /// Fields of points and of cells that belong to the mesh and never change.
@@ -33,11 +40,17 @@ pub(super) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Nothing is reached yet.
+    /// Nothing is reached yet. Collective.
     pub fn new(scene: &'a Scene, discrete: &'a Discrete, comm: &'a dyn Comm, goal: Option<Goal>, moved: Moved) -> Self {
         let piece = fields::mesh(&discrete.decomposition.subdomains, comm.rank());
         let fixed = [piece.point_data.len(), piece.cell_data.len()];
-        Self { scene, discrete, comm, goal, piece, fixed, rows: Vec::new(), closed: Vec::new(), moved }
+        let contacts = scene.contact.values().zip(&discrete.contacts.surfaces).filter(|_| scene.solver.error.is_some());
+        let touching = contacts.map(|(contact, of)| {
+            let surfaces = (of.slave, of.master.filter(|_| of.is_mortar));
+            Touching::new(comm, &discrete.decomposition, surfaces, (contact.clearance.is_some(), of.share))
+        });
+        let touching = touching.collect();
+        Self { scene, discrete, comm, goal, touching, piece, fixed, rows: Vec::new(), closed: Vec::new(), moved }
     }
 
     /// Goes on after increments whose rows and fields are known.
@@ -60,12 +73,9 @@ impl<'a> Recorder<'a> {
     pub fn record(&mut self, newton: &mut Newton, timer: &Timer) {
         let is_there = newton.outcome() == Some(&newton::Outcome::Converged);
         let measured = self.goal.as_mut().filter(|_| is_there).and_then(|goal| goal.measure(newton, timer));
-        // The potential is that of the step, so its distances are measured before the step is committed.
-        let distances = self.scene.solver.error.map(|_| {
-            let (problem, u) = (newton.problem(), &newton.iterate().u);
-            let perfect = self.scene.has_limit_load();
-            timer.time("error estimate", || bregman::distances(problem.sums, &problem.regions(), u, perfect))
-        });
+        let contact = report::contact_states(newton.problem(), newton.iterate());
+        let errors = self.scene.solver.error.map(|_| timer.time("error estimate", || self.distances(newton, &contact)));
+        let (distances, consistency) = errors.unzip();
         let (goal, mut sizes) = measured.unzip();
         if goal.is_none() && self.goal.is_some() {
             // Every increment has the same fields.
@@ -73,15 +83,40 @@ impl<'a> Recorder<'a> {
             sizes = Some(self.discrete.decomposition.subdomains.iter().map(unknown).collect());
         }
         let of_elements = fields::OfElements { distances, sizes };
-        timer.time("records", || self.record_results(newton, goal, of_elements));
+        timer.time("records", || {
+            let row = self.row(newton, &contact, of_elements);
+            self.rows.push(StepRow { goal, consistency, ..row });
+        });
     }
 
-    fn record_results(&mut self, newton: &Newton, goal: Option<GoalRow>, of_elements: fields::OfElements) {
+    /// How far the energy is above the least one in each element of each own subdomain, and what conditions of contact have of all that.
+    /// The potential is that of the step, so this is before the step is committed. Collective.
+    fn distances(&self, newton: &Newton, contact: &[ContactState]) -> (Vec<Vec<f64>>, f64) {
+        let (discrete, problem, u) = (self.discrete, newton.problem(), &newton.iterate().u);
+        let mut distances = bregman::distances(problem.sums, &problem.regions(), u, self.scene.has_limit_load());
+        let moved = limits::displacements(self.comm, discrete, u, self.touching.iter().flat_map(Touching::nodes));
+        let of_state = |state: &ContactState| {
+            let pair = &discrete.contacts.pairs[state.pair];
+            let known = State { pressure: state.force / pair.area, gap: state.gap };
+            ((pair.contact, pair.slave, pair.part), known)
+        };
+        let states: HashMap<(usize, u64, u32), State> = contact.iter().map(of_state).collect();
+        let mut added = vec![0.0; distances.len()];
+        for (number, touching) in self.touching.iter().enumerate() {
+            let state = |node: u64, part: u32| states.get(&(number, node, part)).copied();
+            for (own, element, energy) in touching.errors(state, |node| moved[&node]) {
+                distances[own][element] += energy;
+                added[own] += energy;
+            }
+        }
+        (distances, exact::sum(self.comm, &added, 1)[0])
+    }
+
+    /// Adds the fields of an increment, and tells of it.
+    fn row(&mut self, newton: &Newton, contact: &[ContactState], of_elements: fields::OfElements) -> StepRow {
         let (scene, discrete, comm) = (self.scene, self.discrete, self.comm);
-        let contact = report::contact_states(newton.problem(), newton.iterate());
-        let von_mises = fields::record(&mut self.piece, newton, (&discrete.contacts, &contact), of_elements);
-        let row = report::step_row(comm, scene, discrete, newton, &contact, von_mises);
-        self.rows.push(StepRow { goal, ..row });
+        let von_mises = fields::record(&mut self.piece, newton, (&discrete.contacts, contact), of_elements);
         self.closed = contact.iter().filter(|state| state.status.is_closed()).map(|state| state.pair as u64).collect();
+        report::step_row(comm, scene, discrete, newton, contact, von_mises)
     }
 }

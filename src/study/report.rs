@@ -57,6 +57,7 @@ pub(super) fn step_row(
         converged,
         limit_load: bounds.map(|newton::Bounds { lower, upper, work }| LimitLoad::new(lower, upper, work)),
         goal: None,
+        consistency: None,
         state: State { measures, ..state(scene, discrete, newton, contact, von_mises) },
     }
 }

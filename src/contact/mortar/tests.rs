@@ -125,7 +125,7 @@ fn a_constant_pressure_acts_on_both_sides_as_it_should() {
 }
 
 /// The same surface with quadratic faces: their middles halfway between the corners.
-fn quadratic(surface: GatheredSurface) -> GatheredSurface {
+pub fn quadratic(surface: GatheredSurface) -> GatheredSurface {
     let GatheredSurface { mut nodes, mut points, triangles, .. } = surface;
     let mut middles = BTreeMap::new();
     let first = nodes[0];

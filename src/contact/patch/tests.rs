@@ -61,9 +61,9 @@ fn rings(around: [usize; 2]) -> Scene {
 /// The conditions of the whole surfaces, as every rank would find them that sees these.
 fn whole(setup: &Setup) -> (Conditions, Rule) {
     let discrete = &setup.discrete;
-    let gather =
-        |index: usize| GatheredSurface::gather(setup.comm, setup.subdomains(), discrete.contacts.surfaces[index]);
-    let (slave, master) = (gather(0), gather(1));
+    let gather = |surface: usize| GatheredSurface::gather(setup.comm, setup.subdomains(), surface);
+    let surfaces = discrete.contacts.surfaces[0];
+    let (slave, master) = (gather(surfaces.slave), gather(surfaces.master.expect("it has two sides")));
     if let Some(found) = matching::pair(0, &slave, &master) {
         let pairs = quadratic::conditions(&slave, quadratic::SHARE, found.pairs);
         return (Conditions { pairs, ..found }, Rule::NodeToNode);
@@ -136,7 +136,7 @@ fn all_faces_along_lines_are_found_wherever_they_are() {
     for scene in [two_bricks(&["decomposition.cells=[1, 1, 1]"]), two_meshes(12)] {
         for ranks in RANKS {
             on_ranks(&scene, ranks, |setup| {
-                let surface = setup.discrete.contacts.surfaces[0];
+                let surface = setup.discrete.contacts.surfaces[0].slave;
                 let whole = GatheredSurface::gather(setup.comm, setup.subdomains(), surface);
                 let patch = Patch::new(setup.comm, &setup.discrete.decomposition, surface);
                 // Each rank asks for others.

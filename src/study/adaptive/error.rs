@@ -12,7 +12,8 @@
 //! `UNKNOWN`, or what meshes that are nearer tell, if that is more, up to `LARGEST`: a distance that hardly fell while the energy did was
 //! too small. Then it is at least `LEAST`: where bodies touch, conditions are those of a mesh, and energies need not fall. Where a limit
 //! load is sought, it is at least `LEAST_OF_LIMIT`: distances are far too large on coarse meshes there, and much of them can vanish with
-//! little of the error. Where an energy rises, the error is taken to be as large at least. `gap` bounds what the solver left. Energies of a
+//! little of the error. What conditions of contact add to a distance (`estimate::contact`) is too large where pressures end within an
+//! element: such meshes tell no factor, and where it is noticed at all the least one is `LEAST_OF_CONTACT`. Where an energy rises, the error is taken to be as large at least. `gap` bounds what the solver left. Energies of a
 //! history are those of its last increment, which begins from another state on each mesh: there `theta` is `UNKNOWN`.
 //!
 //! Of the stress: the estimate of `estimate`, by `SAFETY` larger.
@@ -42,6 +43,12 @@ const APART: f64 = 2.0;
 const LEAST: f64 = 0.5;
 /// See [`LEAST`]; near limit loads it was 0.7 to 2.3.
 const LEAST_OF_LIMIT: f64 = 1.5;
+/// Where conditions of contact have more than this share of a distance, the least factor is `LEAST_OF_CONTACT`: it was 0.6 to 1.8 there.
+const NOTICED: f64 = 0.01;
+/// See [`LEAST`] and [`NOTICED`].
+const LEAST_OF_CONTACT: f64 = 1.2;
+/// Where they have more than this share of a distance it may be several times too large, and tells nothing of that of a finer mesh.
+const PLAIN: f64 = 0.1;
 /// Where nothing tells it: of histories, in which each element counts with the largest distance of all increments, the largest that was
 /// found was 1.9.
 const UNKNOWN: f64 = 2.0;
@@ -128,10 +135,17 @@ fn factor(meshes: &[RefinementRow]) -> f64 {
     let Some((fine, coarser)) = meshes.split_last() else { return UNKNOWN };
     let below = |apart: f64| move |coarse: &&RefinementRow| coarse.distance >= apart * fine.distance;
     let theta = |coarse: &RefinementRow| (coarse.energy - fine.energy) / (coarse.distance - fine.distance);
-    let before = || coarser.iter().rev().filter(|coarse| compares(coarse, fine));
+    let of_contact = |share: f64| move |row: &RefinementRow| row.consistency > share * row.distance;
+    let is_plain = |coarse: &&RefinementRow| compares(coarse, fine) && !of_contact(PLAIN)(coarse);
+    let before = || coarser.iter().rev().filter(is_plain);
     let told = before().filter(below(APART)).take(2).map(theta).reduce(f64::max);
     let near = || before().filter(below(1.0)).map(theta).fold(UNKNOWN, f64::max).min(LARGEST);
-    told.unwrap_or_else(near).max(if fine.limit_load.is_some() { LEAST_OF_LIMIT } else { LEAST })
+    let least = match fine.limit_load {
+        Some(_) => LEAST_OF_LIMIT,
+        None if meshes.iter().any(of_contact(NOTICED)) => LEAST_OF_CONTACT,
+        None => LEAST,
+    };
+    told.unwrap_or_else(near).max(least)
 }
 
 #[cfg(test)]
@@ -156,6 +170,19 @@ mod tests {
         let of_limit = [row(8.2, 3.0, 1.0), row(8.0, 1.0, 1.0)];
         assert_eq!(estimate(&ErrorOf::Energy, &of_limit), LEAST_OF_LIMIT / 8.0);
         assert_eq!(estimate(&ErrorOf::Energy, &[known(8.2, 3.0), known(8.0, 1.0)]), LEAST / 8.0);
+    }
+
+    /// Distances that are those of conditions fall faster than the error does.
+    #[test]
+    fn meshes_whose_distance_is_of_contact_tell_no_factor() {
+        let row = |energy, distance, consistency| RefinementRow { consistency, ..known(energy, distance) };
+        let fine = row(8.0, 1.0, 0.02);
+        let of = |coarse: RefinementRow| estimate(&ErrorOf::Energy, &[coarse, fine.clone()]) * 8.0;
+        assert_eq!(of(row(9.5, 4.0, 3.0)), UNKNOWN);
+        assert_eq!(of(row(12.5, 4.0, 0.3)), 1.5);
+        assert_eq!(of(row(8.5, 4.0, 0.3)), LEAST_OF_CONTACT);
+        let fits = [row(8.6, 4.0, 0.001), row(8.0, 1.0, 0.001)];
+        assert_eq!(estimate(&ErrorOf::Energy, &fits) * 8.0, LEAST);
     }
 
     #[test]
