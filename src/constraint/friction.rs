@@ -26,7 +26,7 @@ pub struct Slider {
     pub normal: usize,
     /// Rows along the surface, one or two.
     pub tangents: Vec<Tangent>,
-    /// All of the slave surface that belongs to the pair (area).
+    /// Area of the pair that the limit of Tresca's law acts on.
     pub limit_area: f64,
 }
 

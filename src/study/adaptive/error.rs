@@ -13,8 +13,9 @@
 //! too small. Then it is at least `LEAST`: where bodies touch, conditions are those of a mesh, and energies need not fall. Where a limit
 //! load is sought, it is at least `LEAST_OF_LIMIT`: distances are far too large on coarse meshes there, and much of them can vanish with
 //! little of the error. What conditions of contact add to a distance (`estimate::contact`) is too large where pressures end within an
-//! element: such meshes tell no factor, and where it is noticed at all the least one is `LEAST_OF_CONTACT`. Where an energy rises, the error is taken to be as large at least. `gap` bounds what the solver left. Energies of a
-//! history are those of its last increment, which begins from another state on each mesh: there `theta` is `UNKNOWN`.
+//! element: such meshes tell no factor, and where it is noticed at all the least one is `LEAST_OF_CONTACT`. Where an energy rises, the
+//! error is taken to be as large at least. `gap` bounds what the solver left. Energies of a history are those of its last increment, which
+//! begins from another state on each mesh: there `theta` is `UNKNOWN`.
 //!
 //! Of the stress: the estimate of `estimate`, by `SAFETY` larger.
 //!
