@@ -1,4 +1,6 @@
-//! Vectors in space, and inner products of any.
+//! Vectors in space, and inner products and sums of any.
+
+use crate::work;
 
 /// A point or a direction.
 pub type Point = [f64; 3];
@@ -7,6 +9,14 @@ pub type Point = [f64; 3];
 #[inline]
 pub fn dot(x: impl AsRef<[f64]>, y: impl AsRef<[f64]>) -> f64 {
     x.as_ref().iter().zip(y.as_ref()).map(|(x, y)| x * y).sum()
+}
+
+/// `y = y + a x`.
+pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+    work::each(x.len(), 2, size_of::<f64>());
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += a * x;
+    }
 }
 
 /// Euclidean length.

@@ -11,6 +11,11 @@ impl GatheredSurface {
     /// does to the node. Normals are means of those of the faces around it, weighted by area: of quadratic faces of those at the node,
     /// so that they are as exact at the end of a curved surface as inside.
     pub fn normals_and_areas(&self) -> Vec<([f64; 3], f64)> {
+        self.normals_and_areas_with(quadratic::SHARE)
+    }
+
+    /// As [`Self::normals_and_areas`], where corners of quadratic faces get that share of the functions of middles.
+    pub fn normals_and_areas_with(&self, share: f64) -> Vec<([f64; 3], f64)> {
         let mut sums = vec![[0.0; 3]; self.nodes.len()];
         let mut add = |node: usize, factor: f64, vector: [f64; 3]| {
             sums[node].iter_mut().zip(vector).for_each(|(sum, x)| *sum += factor * x);
@@ -30,7 +35,7 @@ impl GatheredSurface {
         };
         let mut all: Vec<_> = sums.into_iter().map(parts).collect();
         if !self.quadratic.is_empty() {
-            let areas = quadratic::areas(self, quadratic::SHARE, |_| true);
+            let areas = quadratic::areas(self, share, |_| true);
             all.iter_mut().zip(areas).for_each(|((_, sum), area)| *sum = area);
         }
         all

@@ -37,12 +37,7 @@ pub fn pair(
     surface: &GatheredSurface,
     obstacle: &Obstacle,
 ) -> Result<Conditions, ContactError> {
-    let mut normals = surface.normals_and_areas();
-    if !surface.quadratic.is_empty() {
-        let areas = quadratic::areas(surface, share(obstacle), |_| true);
-        normals.iter_mut().zip(areas).for_each(|((_, own), area)| *own = area);
-    }
-    let nodes = surface.nodes.iter().zip(&surface.points).zip(normals);
+    let nodes = surface.nodes.iter().zip(&surface.points).zip(surface.normals_and_areas_with(share(obstacle)));
     let own = nodes.zip(&surface.parts).enumerate().filter(|(index, _)| surface.layer(*index) == Layer::Own);
     let pairs = own.filter_map(|(_, (((&slave, &point), (outward, area)), &part))| {
         let (normal, gap) = approach(obstacle, point, outward)?;

@@ -12,6 +12,7 @@ use crate::contact::mortar;
 use crate::contact::patch::Patch;
 use crate::contact::surface::GatheredSurface;
 use crate::decomposition::{Decomposition, Subdomain};
+use crate::mesh::faces::key;
 
 /// Of what conditions add this share was found in the energy: 0.15 to 0.3 where pressures end within an element or two, on pins in
 /// bores and balls in bowls.
@@ -43,12 +44,12 @@ impl Touching {
             let master = Patch::new(comm, decomposition, surface);
             master.near(comm, &mortar::lines(&slave.surface)).into_owned()
         });
-        let mut behind: HashMap<usize, HashMap<[u32; 3], usize>> = HashMap::new();
+        let mut behind: HashMap<usize, HashMap<Vec<u32>, usize>> = HashMap::new();
         let place = |(face, id, facet): (usize, usize, usize)| {
             let own = decomposition.own_index(id as u32).expect("the face is an own one");
             let subdomain = &decomposition.subdomains[own];
             let elements = behind.entry(own).or_insert_with(|| elements(subdomain));
-            (face, own, elements[&corners(&subdomain.facets[facet].nodes)])
+            (face, own, elements[&key(&subdomain.facets[facet].nodes)])
         };
         let faces = slave.own().map(place).collect();
         Self { slave, master, are_given, share, faces }
@@ -56,8 +57,7 @@ impl Touching {
 
     /// Nodes whose displacements are needed.
     pub fn nodes(&self) -> impl Iterator<Item = u64> {
-        let of = |surface: &'_ GatheredSurface| surface.nodes.clone();
-        self.master.as_ref().into_iter().flat_map(move |master| [of(&self.slave.surface), of(master)]).flatten()
+        self.master.iter().flat_map(|master| self.slave.surface.nodes.iter().chain(&master.nodes)).copied()
     }
 
     /// By how much energy elements on the slave are off: own subdomain, element, energy; for each face of an element one. `state` knows
@@ -80,20 +80,14 @@ impl Touching {
     }
 }
 
-/// Corners of a face of a tetrahedron, ascending.
-fn corners(nodes: &[u32]) -> [u32; 3] {
-    let mut corners = [nodes[0], nodes[1], nodes[2]];
-    corners.sort_unstable();
-    corners
-}
-
-/// The element behind each facet of a subdomain of tetrahedra.
-fn elements(subdomain: &Subdomain) -> HashMap<[u32; 3], usize> {
-    let mut behind: HashMap<[u32; 3], usize> =
-        subdomain.facets.iter().map(|facet| (corners(&facet.nodes), usize::MAX)).collect();
+/// The element behind each facet of a subdomain, by the facet's [`key`].
+fn elements(subdomain: &Subdomain) -> HashMap<Vec<u32>, usize> {
+    let mut behind: HashMap<Vec<u32>, usize> =
+        subdomain.facets.iter().map(|facet| (key(&facet.nodes), usize::MAX)).collect();
     for (element, nodes) in subdomain.elements.iter().enumerate() {
         for face in subdomain.elements.kind().faces() {
-            if let Some(of) = behind.get_mut(&corners(&[nodes[face[0]], nodes[face[1]], nodes[face[2]]])) {
+            let face: Vec<u32> = face.iter().map(|&node| nodes[node]).collect();
+            if let Some(of) = behind.get_mut(&key(&face)) {
                 *of = element;
             }
         }

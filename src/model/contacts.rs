@@ -139,10 +139,9 @@ fn one(
     let extent = |body: &String| &extents[scene.body.keys().position(|known| known == body).expect("it exists")];
     let bodies: Vec<_> = surfaces.iter().map(|(surface, _)| (&surface.body, extent(&surface.body))).collect();
     warnings.extend(extent::overlap(comm, name, pairs, &sites, &bodies));
-    let [slave_index, master_index] = [slave, 1 - slave].map(|k| surfaces.get(k).map(|(surface, _)| index(surface)));
     let touching = Surfaces {
-        slave: slave_index.expect("a contact has a surface"),
-        master: master_index,
+        slave: index(surfaces[slave].0),
+        master: surfaces.get(1 - slave).map(|(surface, _)| index(surface)),
         is_mortar: rule == rule_name(Rule::Mortar),
         share: match &contact.sides {
             Sides::Rigid { obstacle, .. } => rigid::share(obstacle),

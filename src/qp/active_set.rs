@@ -25,7 +25,8 @@ use self::exactness::{Exactness, LOOSE};
 use super::pcpg::{Directions, Pcpg};
 use super::quadratic::{Quadratic, Space};
 use super::slides::Slides;
-use super::{Limits, Outcome, Statistics, axpy};
+use super::{Limits, Outcome, Statistics};
+use crate::vector::axpy;
 
 /// Sets that are tried at most.
 const SETS: usize = 60;

@@ -30,8 +30,6 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
-use crate::work;
-
 /// How a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -106,13 +104,5 @@ impl Limits {
     /// A first gradient norm, unless it may be nothing but rounding.
     pub fn told(&self, first: f64) -> Option<f64> {
         (first > self.rounding).then_some(first)
-    }
-}
-
-/// `y = y + a x`.
-pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
-    work::each(x.len(), 2, size_of::<f64>());
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += a * x;
     }
 }

@@ -13,7 +13,8 @@
 
 use super::feasible::{Face, FeasibleSet, Parts};
 use super::quadratic::Space;
-use super::{Outcome, Statistics, axpy};
+use super::{Outcome, Statistics};
+use crate::vector::axpy;
 
 /// Gamma of the proportioning test; 1 makes proportioning rare and CG long.
 const PROPORTION: f64 = 1.0;

@@ -14,7 +14,8 @@
 //! r'P M P'r otherwise, and x goes to the minimum along the kept directions once more.
 
 use super::quadratic::{Quadratic, Space};
-use super::{Limits, Outcome, Statistics, axpy};
+use super::{Limits, Outcome, Statistics};
+use crate::vector::axpy;
 
 /// Directions kept (two vectors each); beyond that the oldest is replaced.
 const KEPT: usize = 240;

@@ -1,9 +1,9 @@
 //! The Hessian P A P + rho Q of the augmented Lagrangian, Q = I - P: one product with A and two projections.
 
-use super::axpy;
 use super::feasible::Face;
 use super::mprgp::{Hessian, Point};
 use super::quadratic::Quadratic;
+use crate::vector::axpy;
 
 /// The Hessian P A P + rho Q.
 pub(super) struct Penalised<'a> {

@@ -5,8 +5,8 @@
 //! good to a few per cent: never use it as if it were exact. No reorthogonalisation; the lost orthogonality does not
 //! spoil the largest value.
 
-use super::axpy;
 use super::quadratic::{Quadratic, Space};
+use crate::vector::axpy;
 
 /// Products at most.
 const STEPS: usize = 12;

@@ -18,7 +18,8 @@ use super::feasible::FeasibleSet;
 use super::mprgp::{Mprgp, Norms, Point};
 use super::penalty::Penalised;
 use super::quadratic::{Quadratic, Space};
-use super::{Limits, Outcome, Statistics, axpy};
+use super::{Limits, Outcome, Statistics};
+use crate::vector::axpy;
 
 /// Penalty rho, times the norm. Adds one far cluster of eigenvalues, which does not slow CG (Dostal 2009, section 4.6).
 const PENALTY: f64 = 100.0;

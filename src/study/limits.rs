@@ -17,9 +17,9 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use super::cascade::fetch;
 use super::contact::ContactState;
 use crate::assembly::gradients;
-use crate::comm::meeting::look_up;
 use crate::comm::{Comm, of_largest};
 use crate::constraint::Kind;
 use crate::constraint::law::Status;
@@ -149,7 +149,7 @@ fn add_contact(
     let (name, contact) = scene.contact.iter().nth(pair.contact).expect("a pair belongs to a contact");
     let moved = contact.displacement().map(|d| -d * obstacle_factor(scene, name, at));
     let motion = pair.nodes().fold(moved, |sum, (node, weight)| {
-        let u = of_nodes.get(&node).copied().unwrap_or_default();
+        let u = of_nodes[&node];
         std::array::from_fn(|a| sum[a] + weight * u[a])
     });
     let along = dot(motion, pair.normal);
@@ -176,17 +176,14 @@ pub(super) fn displacements(
     u: &Torn,
     nodes: impl Iterator<Item = u64>,
 ) -> HashMap<u64, [f64; 3]> {
-    let mut mine = Vec::new();
-    for (subdomain, u) in discrete.decomposition.subdomains.iter().zip(u) {
+    let of_surfaces = |(subdomain, u): (&Subdomain, &Vec<f64>)| {
         let facets = subdomain.facets.iter().filter(|facet| discrete.contacts.touch(facet.surface));
         let nodes: BTreeSet<u32> = facets.flat_map(|facet| facet.nodes.iter().copied()).collect();
-        for node in nodes.into_iter().map(|node| node as usize) {
-            let bits = u[3 * node..3 * node + 3].iter().map(|x| x.to_bits()).collect();
-            mine.push(([subdomain.nodes[node]], bits));
-        }
-    }
-    let found = look_up(comm, mine, nodes.map(|node| [node]).collect::<BTreeSet<[u64; 1]>>());
-    found.into_iter().map(|([node], bits)| (node, std::array::from_fn(|a| f64::from_bits(bits[a])))).collect()
+        let of_node = |node: usize| (subdomain.nodes[node], u.as_chunks::<3>().0[node]);
+        nodes.into_iter().map(|node| of_node(node as usize)).collect::<Vec<_>>()
+    };
+    let known = discrete.decomposition.subdomains.iter().zip(u).flat_map(of_surfaces);
+    fetch(comm, known, nodes.collect())
 }
 
 /// The rounding of coordinates over the largest stretch of a body. It matters to contacts only.

@@ -4,8 +4,7 @@
 //! joins, columns that would turn negative leave. At the end the residual r = b - A x has A'r <= 0 and x'A'r = 0. So if r is
 //! not zero no nonnegative x reaches b, and r shows why: b'r = |r|^2 > 0, but no column goes along r (Farkas).
 
-use crate::qp::axpy;
-use crate::vector::{dot, length};
+use crate::vector::{axpy, dot, length};
 
 /// Share of |b| that a unit column must have along the residual to join, and share of a column that must be new.
 const ROUNDING: f64 = 1e-12;

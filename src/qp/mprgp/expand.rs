@@ -6,7 +6,8 @@
 //! of Dostal and Schoberl (2005) that cannot fail.
 
 use super::{FIXED_STEP, Hessian, Line, Mprgp, Point};
-use crate::qp::{Statistics, axpy};
+use crate::qp::Statistics;
+use crate::vector::axpy;
 
 /// A step that did not lower the cost is tried at this share of its length ...
 const SHORTER: f64 = 0.25;

@@ -5,7 +5,8 @@ use super::dense::{Joined, Matrix, Null, OnFaces, Plain, Random, distance, dot};
 use crate::qp::discs::Disc;
 use crate::qp::feasible::FeasibleSet;
 use crate::qp::smalse::{Problem, Settings, Solution, Start, solve};
-use crate::qp::{Limits, Outcome, axpy};
+use crate::qp::{Limits, Outcome};
+use crate::vector::axpy;
 
 const LIMITS: Limits =
     Limits { relative: 1e-9, reference: None, absolute: 0.0, rounding: 0.0, drop: 0.0, products: 5000 };

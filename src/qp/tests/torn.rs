@@ -7,7 +7,8 @@ use crate::qp::active_set::Face;
 use crate::qp::feasible::FeasibleSet;
 use crate::qp::quadratic::Quadratic;
 use crate::qp::smalse::{Problem, Settings, Solution, Start, solve};
-use crate::qp::{self, Limits, axpy, power};
+use crate::qp::{self, Limits, power};
+use crate::vector::axpy;
 
 /// One equality, on the kept rows and on all rows, with its right-hand side.
 #[derive(Clone)]
