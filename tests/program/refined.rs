@@ -176,7 +176,7 @@ fn histories_are_solved_on_each_mesh() {
     let sets = ["solver.error=0.2", "step=[{increments=2}, {amplitude=0.2}]"];
     let mut arguments = vec!["solve", "two-blocks", "--progress", "off", "--out", whole.to_str().unwrap()];
     arguments.extend(sets.iter().flat_map(|set| ["--set", *set]));
-    let run = run_briefly(1, &arguments);
+    let run = run_briefly(2, &arguments);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let file = stopped_after(8, &out, &sets);
     let end = resume_with(2, &file, &[]);

@@ -142,8 +142,9 @@ fn prepare(ranks: usize, arguments: &[&str], directory: &Path) -> (Command, [Pat
 /// What Open MPI has to know on a machine with few cores, where the tests may be root.
 pub fn on_one_machine(command: &mut Command) {
     command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
-    // Looking for networks takes half of the time of a start.
+    // Looking for networks takes half of the time of a start, and the daemon that a single rank asks for as much.
     command.env("OMPI_MCA_rmaps_base_oversubscribe", "1").env("OMPI_MCA_pml", "ob1");
+    command.env("OMPI_MCA_ess_singleton_isolated", "1");
 }
 
 /// The end of a command, which is killed and a failure of the test if it does not come in time.
