@@ -134,6 +134,15 @@ pub fn clustered() -> Scene {
     built_in("patch", &["decomposition.cells=[1, 1, 1]", "decomposition.cluster=8"])
 }
 
+/// Two long bricks whose meshes do not match: subdomains touch a part of the contact, and hold a little more.
+pub fn long_contact() -> Scene {
+    two_bricks(&[
+        "body.lower.brick={origin=[0.0,0.0,0.0],size=[9.0,2.2,1.0],cells=[18,4,2]}",
+        "body.upper.brick={origin=[1.0,0.0,1.1],size=[8.0,2.2,1.0],cells=[12,4,2]}",
+        "decomposition.cells=[3, 4, 2]",
+    ])
+}
+
 /// As [`two_bricks`], with meshes that do not match: all contact rows are in one block.
 pub fn not_matching(sets: &[&str]) -> Scene {
     let cells =

@@ -6,15 +6,24 @@ use super::Kind;
 use super::contact::Side;
 use super::links::{Linked, components};
 use super::prescribed::Prescribed;
+use super::reach::Reach;
 use super::ties::Ties;
-use super::{Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, friction, gluing};
+use super::{Constraints, Entry, Row, Support, Term, contact, dirichlet, friction, gluing};
 use crate::contact::known::Pairs;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
-/// Nodes tied together by contact and short edges, and the contact pairs among them.
-struct Cluster {
-    nodes: BTreeSet<u64>,
+/// What one block is made of.
+struct Unit {
+    /// Subdomains that hold it, ascending.
+    holders: Vec<u32>,
+    /// Its lowest node.
+    key: u64,
+    /// Nodes whose own rows are in it.
+    nodes: Vec<u64>,
+    /// Its contact pairs.
     pairs: Vec<usize>,
+    /// Whether it is part of a large component.
+    is_part: bool,
 }
 
 impl Constraints {
@@ -28,52 +37,49 @@ impl Constraints {
         at: &Prescribed,
         friction: &[bool],
     ) -> Self {
-        let Linked { nodes: tied, ties, stiffness } = linked;
-        let clusters = clusters(pairs, &ties);
+        let Linked { nodes: tied, ties, stiffness, reach, has_large } = linked;
         let young = |subdomain: u32| stiffness.of(subdomain);
         let own: HashMap<u64, &InterfaceNode> = decomposition.interface.iter().map(|n| (n.node, n)).collect();
         let node = |number: u64| tied.get(&number).or_else(|| own.get(&number).copied());
-        let alone = own.keys().filter(|number| !tied.contains_key(number));
-        let keys: BTreeSet<u64> = clusters.keys().chain(alone).copied().collect();
-        let nodes = |key: u64| -> Vec<&InterfaceNode> {
-            clusters
-                .get(&key)
-                .map_or(node(key).into_iter().collect(), |c| c.nodes.iter().filter_map(|&n| node(n)).collect())
+        let side = |number: u64| -> Side<'_> {
+            let node = node(number).expect("nodes of conditions are known");
+            (node, dirichlet::fixed(node, supports))
         };
+        let units = units(own.keys().chain(tied.keys()), pairs, &ties, &reach, node);
         let mut result = Self {
             rows: Vec::new(),
             sliders: Vec::new(),
             blocks: Vec::new(),
             block_subdomains: Vec::new(),
+            is_part: Vec::new(),
+            has_parts: has_large,
             slot_begin: vec![0],
             slot_subdomain: Vec::new(),
             entries: vec![Vec::new(); decomposition.subdomains.len()],
             copies: local_copies(decomposition),
             has_inequalities: pairs.total() > 0,
             has_friction: friction.contains(&true),
-            uneven: stiffness.least * JUMP <= stiffness.largest,
+            uneven: stiffness.is_uneven(),
             ties,
             idle: Vec::new(),
             guided: Vec::new(),
         };
         let mut directions = Vec::new();
-        for (subdomains, key) in by_subdomains(keys, nodes) {
+        for unit in units {
             let mut rows = Vec::new();
-            let mut sides: BTreeMap<u64, Side> = BTreeMap::new();
-            for interface in nodes(key) {
-                let fixed = dirichlet::fixed(interface, supports);
+            for &number in &unit.nodes {
+                let (interface, fixed) = side(number);
                 rows.extend(gluing::rows(interface, &decomposition.clusters, young));
                 rows.extend(dirichlet::rows(interface, &fixed));
-                sides.insert(interface.node, (interface, fixed));
             }
             let mut contacts: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
-            for &number in clusters.get(&key).iter().flat_map(|cluster| &cluster.pairs) {
+            for &number in &unit.pairs {
                 let pair = &pairs[number];
-                match contact::row(number, pair, &|node| sides[&node]) {
+                match contact::row(number, pair, &side) {
                     Ok(row) => {
                         contact::add_tightest(contacts.entry(pair.slave).or_default(), row, at);
                         if friction[pair.contact] {
-                            result.guided.extend(friction::guided(number, pair, &|node| sides[&node]));
+                            result.guided.extend(friction::guided(number, pair, &side));
                         }
                     }
                     Err(held) => result.idle.push((number, held)),
@@ -82,23 +88,24 @@ impl Constraints {
             rows.iter_mut().for_each(|row| row.weigh(young, stiffness.largest));
             for mut of_node in contacts.into_values() {
                 of_node.iter_mut().for_each(|row| row.weigh(young, stiffness.largest));
-                let (more, along) = friction_rows(&of_node, pairs, &|node| sides[&node], friction);
+                let (more, along) = friction_rows(&of_node, pairs, &side, friction);
                 directions.extend(along);
                 rows.extend(of_node.into_iter().chain(more));
             }
-            result.push_block(rows, subdomains, decomposition);
+            result.push_block(rows, unit, decomposition);
         }
         result.find_sliders(pairs, directions);
         result
     }
 
     /// Appends the rows of a block; nothing if it has none.
-    fn push_block(&mut self, rows: Vec<Row>, subdomains: Vec<u32>, decomposition: &Decomposition) {
+    fn push_block(&mut self, rows: Vec<Row>, unit: Unit, decomposition: &Decomposition) {
         if rows.is_empty() {
             return;
         }
         self.blocks.push(self.rows.len()..self.rows.len() + rows.len());
-        self.block_subdomains.push(subdomains);
+        self.block_subdomains.push(unit.holders);
+        self.is_part.push(unit.is_part);
         for mut row in rows {
             let number = self.rows.len() as u32;
             row.terms.sort_by_key(|t| (t.subdomain, t.node, t.axis));
@@ -115,6 +122,15 @@ impl Constraints {
             }
             self.slot_begin.push(self.slot_subdomain.len() as u32);
             self.rows.push(row);
+        }
+    }
+
+    /// What no other of the scene's blocks is called.
+    pub fn name(&self, block: &std::ops::Range<usize>) -> [u64; 2] {
+        let first = &self.rows[block.start];
+        match first.kind {
+            Kind::Contact { pair } | Kind::Friction { pair, .. } => [1, pair as u64],
+            Kind::Gluing | Kind::Support { .. } => [0, first.terms[0].node],
         }
     }
 
@@ -158,27 +174,61 @@ fn friction_rows<'a>(
     found.into_iter().unzip()
 }
 
-/// The conditions of each connected component of nodes, and its nodes, by its lowest node.
-fn clusters(pairs: &Pairs, ties: &Ties) -> BTreeMap<u64, Cluster> {
-    let mut of_node = HashMap::new();
-    let mut clusters: BTreeMap<u64, Cluster> = BTreeMap::new();
-    for (name, nodes) in components(pairs, ties) {
-        of_node.extend(nodes.iter().map(|&node| (node, name)));
-        clusters.insert(name, Cluster { nodes, pairs: Vec::new() });
+/// What the blocks of a rank are made of, in the order of the subdomains that hold them: what counts for one subdomain is in one place,
+/// and neighbours' rows are. Large components are cut into the own rows of each node, and the conditions of each slave node.
+fn units<'a>(
+    nodes: impl Iterator<Item = &'a u64>,
+    pairs: &Pairs,
+    ties: &Ties,
+    reach: &Reach,
+    node: impl Fn(u64) -> Option<&'a InterfaceNode>,
+) -> Vec<Unit> {
+    let subdomains = |nodes: &BTreeSet<u64>| -> Vec<u32> {
+        let copies = nodes.iter().filter_map(|&number| node(number)).flat_map(|known| known.copies.iter().copied());
+        copies.collect::<BTreeSet<u32>>().into_iter().collect()
+    };
+    let whole = |key: u64, of: &BTreeSet<u64>| Unit {
+        holders: subdomains(of),
+        key,
+        nodes: of.iter().copied().filter(|&number| node(number).is_some()).collect(),
+        pairs: Vec::new(),
+        is_part: false,
+    };
+    let mut units: BTreeMap<(u64, bool), Unit> = BTreeMap::new();
+    // The unit of each node that is tied to others.
+    let mut of_node: HashMap<u64, u64> = HashMap::new();
+    for (name, of) in components(pairs, ties) {
+        if !of.iter().any(|node| reach.nodes.contains_key(node)) {
+            of_node.extend(of.iter().map(|&node| (node, name)));
+            units.insert((name, false), whole(name, &of));
+        }
+    }
+    for &number in nodes {
+        if let Some(holders) = reach.nodes.get(&number) {
+            let unit =
+                || Unit { holders: holders.clone(), key: number, nodes: vec![number], pairs: vec![], is_part: true };
+            units.entry((number, false)).or_insert_with(unit);
+        } else if !of_node.contains_key(&number) {
+            units.insert((number, false), whole(number, &BTreeSet::from([number])));
+        }
     }
     for (number, pair) in pairs.iter() {
-        clusters.get_mut(&of_node[&pair.slave]).expect("every name has its cluster").pairs.push(number);
+        let unit = match of_node.get(&pair.slave) {
+            Some(name) => units.get_mut(&(*name, false)).expect("every component has its unit"),
+            None => units.entry((pair.slave, true)).or_insert_with(|| Unit {
+                holders: reach.slaves[&pair.slave].clone(),
+                key: pair.slave,
+                nodes: Vec::new(),
+                pairs: Vec::new(),
+                is_part: true,
+            }),
+        };
+        unit.pairs.push(number);
     }
-    clusters
-}
-
-/// Keys of blocks with the subdomains of their nodes, in the order of these: what counts for one subdomain is in one place, and
-/// neighbours' rows are.
-fn by_subdomains<'a>(keys: BTreeSet<u64>, nodes: impl Fn(u64) -> Vec<&'a InterfaceNode>) -> Vec<(Vec<u32>, u64)> {
-    let of = |key: u64| -> BTreeSet<u32> { nodes(key).iter().flat_map(|n| n.copies.iter().copied()).collect() };
-    let mut keys: Vec<(Vec<u32>, u64)> = keys.into_iter().map(|key| (of(key).into_iter().collect(), key)).collect();
-    keys.sort_unstable();
-    keys
+    let mut units: Vec<Unit> = units.into_values().collect();
+    // The own rows of a node come before conditions.
+    units.sort_by(|a, b| (&a.holders, a.key).cmp(&(&b.holders, b.key)));
+    units
 }
 
 /// For each own subdomain, its nodes with several copies and how many.

@@ -1,15 +1,17 @@
 //! What the blocks of a rank are made of: conditions, nodes, groups of tied nodes and stiffness, also of other ranks' nodes.
 //!
-//! A block is a connected component of nodes ([`super`]), and is held whole by every rank that touches it. Ranks find the name of
-//! each component together, its lowest node, then who else touches it, and send each other what they have of it. Where meshes match a
-//! component has the few ranks around a node. Where they do not, or on quadratic faces, conditions share nodes: all rows of the
-//! contact are one, and every rank at the contact holds them: `(B B')^-1` couples all of them ([`crate::feti::dual::coupling`]).
+//! Ranks find the name of each connected component of nodes ([`super`]) together, its lowest node, then who else touches it, and send each
+//! other what they have of it. Where meshes match a component has the few ranks around a node, and is held whole by all of them. Where
+//! they do not, or on quadratic faces, conditions share nodes: all rows of the contact are one. Of such a large component ranks hold
+//! what their subdomains [reach](super::reach).
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
+use super::JUMP;
 use super::components::Components;
+use super::reach::{Reach, rounds};
 use super::ties::Ties;
-use crate::comm::meeting::{ask, home};
+use crate::comm::meeting::{ask, home, look_up};
 use crate::comm::{Comm, maximum, sums};
 use crate::contact::ContactPair;
 use crate::contact::known::Pairs;
@@ -23,7 +25,15 @@ pub struct Linked {
     pub ties: Ties,
     /// Of the subdomains that have copies of nodes.
     pub stiffness: Stiffness,
+    /// Who holds what of large components.
+    pub reach: Reach,
+    /// Whether there is any large component, on whatever rank.
+    pub has_large: bool,
 }
+
+/// Components of more conditions and groups of tied nodes are large. Below, ranks that hold all of it have less to do. Tests have small
+/// scenes.
+pub const FEW: u64 = if cfg!(test) { 32 } else { 1000 };
 
 /// How stiff subdomains are.
 pub struct Stiffness {
@@ -35,6 +45,11 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
+    /// Whether it jumps so much that rows are of unequal length.
+    pub fn is_uneven(&self) -> bool {
+        self.least * JUMP <= self.largest
+    }
+
     /// Of a subdomain that has a copy of a node of this rank's blocks.
     pub fn of(&self, subdomain: u32) -> f64 {
         self.known[&subdomain]
@@ -55,51 +70,100 @@ impl Linked {
         };
         let ties = Ties::new(comm, decomposition);
         let names = names(comm, pairs, &ties);
-        let mut linked = Self { nodes: BTreeMap::new(), ties, stiffness };
-        linked.complete(comm, decomposition, pairs, &names);
+        let large = large(comm, decomposition, (pairs, &ties), &names);
+        let is_large = |node: u64| names.get(&node).is_some_and(|name| large.contains(name));
+        let has_large = sums(comm, [large.len() as u64]) != [0];
+        let reach = if has_large {
+            Reach::new(comm, decomposition, (pairs, &ties), rounds(stiffness.is_uneven()), is_large)
+        } else {
+            Reach::default()
+        };
+        let mut linked = Self { nodes: BTreeMap::new(), ties, stiffness, reach, has_large };
+        linked.complete(comm, decomposition, pairs, &names, is_large);
         linked
     }
 
-    /// Brings here what other ranks have of the components of own nodes. Collective.
+    /// Brings here what other ranks have of the components of own nodes, or of what own subdomains reach of them. Collective.
     fn complete(
         &mut self,
         comm: &dyn Comm,
         decomposition: &Decomposition,
         known: &mut Pairs,
         names: &HashMap<u64, u64>,
+        is_large: impl Fn(u64) -> bool,
     ) {
         let linked = || decomposition.interface.iter().filter_map(|node| Some((node, *names.get(&node.node)?)));
-        let members = members(comm, linked().map(|(_, name)| name).collect());
-        let mut messages: [Vec<Vec<u64>>; 4] = std::array::from_fn(|_| vec![Vec::new(); comm.size()]);
-        let [nodes, young, pairs, ties] = &mut messages;
+        let small = linked().filter(|(node, _)| !is_large(node.node)).map(|(_, name)| name);
+        let members = members(comm, small.collect());
+        let owners = |holders: &Vec<u32>| {
+            let mut ranks: Vec<usize> = holders.iter().map(|&subdomain| decomposition.owner(subdomain)).collect();
+            ranks.dedup();
+            ranks
+        };
+        let mut messages: [Vec<Vec<u64>>; 6] = std::array::from_fn(|_| vec![Vec::new(); comm.size()]);
+        let [nodes, young, pairs, ties, of_nodes, of_slaves] = &mut messages;
         // The rank of the lowest copy of a node tells of it and of its conditions.
-        let mut own: HashMap<u64, &Vec<usize>> = HashMap::new();
-        for (node, name) in linked().filter(|(node, _)| decomposition.own_index(node.copies[0]).is_some()) {
-            own.insert(node.node, &members[&name]);
-            for &rank in &members[&name] {
+        let is_told = |node: &InterfaceNode| decomposition.own_index(node.copies[0]).is_some();
+        for (node, name) in linked().filter(|(node, _)| is_told(node)) {
+            let holders = self.reach.nodes.get(&node.node);
+            for rank in holders.map_or_else(|| members[&name].clone(), owners) {
                 node.pack(&mut nodes[rank]);
                 let of = |&copy: &u32| [u64::from(copy), self.stiffness.of(copy).to_bits()];
                 young[rank].extend(node.copies.iter().flat_map(of));
+                holders.iter().for_each(|holders| pack(node.node, holders, &mut of_nodes[rank]));
             }
         }
-        for (number, pair) in known.iter() {
-            let ranks = own.get(&pair.slave).into_iter().flat_map(|ranks| ranks.iter());
-            ranks.for_each(|&rank| known.pack(number, &mut pairs[rank]));
+        for (slave, holders) in &self.reach.slaves {
+            owners(holders).into_iter().for_each(|rank| pack(*slave, holders, &mut of_slaves[rank]));
         }
+        let told: HashMap<u64, u64> =
+            linked().filter(|(node, _)| is_told(node)).map(|(node, name)| (node.node, name)).collect();
+        for (number, pair) in known.iter() {
+            let Some(name) = told.get(&pair.slave) else { continue };
+            let ranks = self.reach.slaves.get(&pair.slave).map_or_else(|| members[name].clone(), owners);
+            ranks.into_iter().for_each(|rank| known.pack(number, &mut pairs[rank]));
+        }
+        // Of nodes that have tied ones in own subdomains, others may be told by other ranks.
         let first = decomposition.subdomains.first().map_or(0, |subdomain| subdomain.id as u32);
+        let tied: BTreeSet<[u64; 1]> = self.ties.iter().flat_map(|(_, nodes)| nodes.iter().map(|&n| [n])).collect();
+        let words = |holders: &Vec<u32>| holders.iter().map(|&s| u64::from(s)).collect();
+        let reached = self.reach.nodes.iter().map(|(node, holders)| ([*node], words(holders)));
+        let reached = look_up(comm, reached, tied);
+        let reaches = |rank: usize, node: u64| {
+            reached.get(&[node]).is_some_and(|of| of.iter().any(|&s| decomposition.owner(s as u32) == rank))
+        };
         let is_member = |rank: usize, node: u64| {
-            names.get(&node).and_then(|name| members.get(name)).is_some_and(|ranks| ranks.binary_search(&rank).is_ok())
+            let of_component = names.get(&node).and_then(|name| members.get(name));
+            of_component.is_some_and(|ranks| ranks.binary_search(&rank).is_ok()) || reaches(rank, node)
         };
         for (rank, message) in ties.iter_mut().enumerate() {
             self.ties.pack(first, |node| is_member(rank, node), message);
         }
-        let [nodes, young, pairs, ties] = messages.map(|message| comm.all_to_all(message));
+        let [nodes, young, pairs, ties, of_nodes, of_slaves] = messages.map(|message| comm.all_to_all(message));
         let nodes = nodes.iter().flat_map(|message| InterfaceNode::unpack(message));
         self.nodes = nodes.map(|node| (node.node, node)).collect();
         let young = young.iter().flat_map(|message| message.as_chunks::<2>().0);
         self.stiffness.known.extend(young.map(|&[subdomain, bits]| (subdomain as u32, f64::from_bits(bits))));
         pairs.iter().for_each(|message| known.unpack(message));
         self.ties.unpack(ties);
+        of_nodes.iter().for_each(|message| unpack(message, &mut self.reach.nodes));
+        of_slaves.iter().for_each(|message| unpack(message, &mut self.reach.slaves));
+    }
+}
+
+/// A node and what holds it, as numbers, for sending.
+fn pack(node: u64, holders: &[u32], message: &mut Vec<u64>) {
+    message.extend([node, holders.len() as u64]);
+    message.extend(holders.iter().map(|&subdomain| u64::from(subdomain)));
+}
+
+/// Adds what [`pack`] has put one behind the other.
+fn unpack(message: &[u64], all: &mut HashMap<u64, Vec<u32>>) {
+    let mut rest = message;
+    while let [node, count, behind @ ..] = rest {
+        let (holders, behind) = behind.split_at(*count as usize);
+        all.insert(*node, holders.iter().map(|&subdomain| subdomain as u32).collect());
+        rest = behind;
     }
 }
 
@@ -114,7 +178,7 @@ pub(super) fn components(pairs: &Pairs, ties: &Ties) -> BTreeMap<u64, BTreeSet<u
     for (_, pair) in pairs.iter() {
         nodes_of(pair).for_each(|node| components.join(pair.slave, node));
     }
-    for nodes in ties.nodes() {
+    for (_, nodes) in ties.iter() {
         nodes.iter().for_each(|&node| components.join(nodes[0], node));
     }
     components.members()
@@ -162,6 +226,34 @@ fn names(comm: &dyn Comm, pairs: &Pairs, ties: &Ties) -> HashMap<u64, u64> {
         }
     }
     nodes.into_iter().zip(names).flat_map(|(nodes, name)| nodes.into_iter().map(move |node| (node, name))).collect()
+}
+
+/// Names of the large ones among the components that own nodes are in. Collective.
+fn large(
+    comm: &dyn Comm,
+    decomposition: &Decomposition,
+    (pairs, ties): (&Pairs, &Ties),
+    names: &HashMap<u64, u64>,
+) -> HashSet<u64> {
+    let is_told = |node: u64| {
+        let at = decomposition.interface.binary_search_by_key(&node, |known| known.node);
+        at.is_ok_and(|at| decomposition.own_index(decomposition.interface[at].copies[0]).is_some())
+    };
+    let mut counts: HashMap<u64, u64> = names.values().map(|&name| (name, 0)).collect();
+    let told = pairs.iter().map(|(_, pair)| pair.slave).filter(|&slave| is_told(slave));
+    let own = ties.iter().filter(|(group, _)| decomposition.own_index((group >> 32) as u32).is_some());
+    for node in told.chain(own.map(|(_, nodes)| nodes[0])) {
+        *counts.get_mut(&names[&node]).expect("it has a name") += 1;
+    }
+    let told: Vec<[u64; 2]> = counts.into_iter().map(|(name, count)| [name, count]).collect();
+    let sum = |reports: &[&[[u64; 2]]]| {
+        let mut sums: HashMap<u64, u64> = HashMap::new();
+        reports.iter().copied().flatten().for_each(|&[name, count]| *sums.entry(name).or_default() += count);
+        move |[name, _]: &[u64; 2]| sums[name]
+    };
+    let counts = ask(comm, &told, |[name, _]| home(&[*name], comm.size()), sum);
+    let large = told.iter().zip(counts).filter(|(_, count)| *count > FEW);
+    large.map(|([name, _], _)| *name).collect()
 }
 
 /// For each of the components that own nodes are in, the ranks of which that is true, ascending. Collective.

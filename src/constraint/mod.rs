@@ -8,7 +8,9 @@
 //!
 //! Rows that share a node form a *block*: the gluing and support rows of a node, together with those of the nodes
 //! that contact, or short edges ([`ties`]), tie to it. A rank holds every row of every block that one of its
-//! subdomains touches, so whatever couples the rows of a block is local. Rows, their order and their coefficients do not depend on the ranks.
+//! subdomains touches, so whatever couples the rows of a block is local. Large components of nodes are cut into many blocks, of which a
+//! rank holds those that its subdomains touch, and some around them ([`reach`]). Rows, their order and their coefficients do not depend on
+//! the ranks.
 //!
 //! Supports and contact act on the mean over the copies and are therefore orthogonal to gluing (design: "Constraint
 //! rows"). The counts are those of the paper's Table 2: gluing `copies - 1` a component, one support row a node and
@@ -23,6 +25,7 @@ pub mod gluing;
 pub mod law;
 pub mod links;
 pub mod prescribed;
+pub mod reach;
 pub mod ties;
 
 use std::ops::Range;
@@ -174,8 +177,12 @@ pub struct Constraints {
     pub sliders: Vec<Slider>,
     /// Rows of each block.
     pub blocks: Vec<Range<usize>>,
-    /// Subdomains of each block, ascending.
+    /// Subdomains that hold each block, ascending: those that touch it and, of parts of large components, those near it.
     pub block_subdomains: Vec<Vec<u32>>,
+    /// Whether each block is part of a large component.
+    pub is_part: Vec<bool>,
+    /// Whether any rank has such blocks.
+    pub has_parts: bool,
     /// First slot of each row, and the end. A slot is the part of one copy of a node in a row.
     pub slot_begin: Vec<u32>,
     /// Subdomain of each slot; ascending within a row.

@@ -3,13 +3,15 @@ use std::collections::HashMap;
 use faer::Mat;
 
 use super::prescribed::Prescribed;
+use super::reach::rounds;
 use super::{ConstraintError, Constraints, Kind, Row, Support};
 use super::{contact, dirichlet};
 use crate::comm::all_gather_u64;
 use crate::contact::ContactPair;
 use crate::decomposition::{InterfaceNode, Subdomain};
 use crate::fixture::{
-    RANKS, Setup, assert_close, built_in, column, not_matching, on_ranks, quarters, two_bricks, two_bricks_by_metis,
+    RANKS, Setup, assert_close, built_in, column, long_contact, not_matching, on_ranks, quarters, two_bricks,
+    two_bricks_by_metis,
 };
 use crate::scene::Scene;
 
@@ -131,7 +133,7 @@ fn point(setup: &Setup, node: u64) -> [f64; 3] {
 
 #[test]
 fn every_rank_holds_the_blocks_of_its_subdomains_and_all_ranks_the_same_rows() {
-    for scene in [two_bricks(&[]), two_bricks_by_metis(9), not_matching(&[])] {
+    for scene in [two_bricks(&[]), two_bricks_by_metis(9), not_matching(&[]), long_contact()] {
         let blocks = |constraints: &Constraints| -> Vec<(Vec<u32>, Vec<Row>)> {
             let rows = constraints.blocks.iter().map(|rows| constraints.rows[rows.clone()].to_vec());
             constraints.block_subdomains.iter().cloned().zip(rows).collect()
@@ -145,6 +147,45 @@ fn every_rank_holds_the_blocks_of_its_subdomains_and_all_ranks_the_same_rows() {
             });
         }
     }
+}
+
+/// By the conditions of the whole scene.
+#[test]
+fn subdomains_hold_what_they_reach_of_a_large_contact() {
+    on_ranks(&long_contact(), 1, |setup| {
+        let (constraints, pairs) = (&setup.discrete.constraints, &setup.discrete.contacts.pairs);
+        let edges: Vec<(u64, Vec<u64>)> =
+            pairs.iter().map(|(_, pair)| (pair.slave, pair.nodes().map(|(node, _)| node).collect())).collect();
+        let (mut of_nodes, mut of_slaves) = (HashMap::new(), HashMap::new());
+        for subdomain in setup.subdomains() {
+            let mut reached: Vec<u64> = subdomain.nodes.clone();
+            for round in 1..=rounds(false) {
+                let near: Vec<_> = edges.iter().filter(|(_, of)| of.iter().any(|n| reached.contains(n))).collect();
+                let more: Vec<u64> = near.iter().flat_map(|(_, of)| of.iter().copied()).collect();
+                reached.extend(more);
+                if round == rounds(false) {
+                    for (slave, _) in near {
+                        of_slaves.entry(*slave).or_insert_with(Vec::new).push(subdomain.id as u32);
+                    }
+                }
+            }
+            reached.sort_unstable();
+            reached.dedup();
+            reached.iter().for_each(|&node| of_nodes.entry(node).or_insert_with(Vec::new).push(subdomain.id as u32));
+        }
+        let mut differ = std::collections::BTreeSet::new();
+        let blocks = constraints.blocks.iter().zip(&constraints.block_subdomains).zip(&constraints.is_part);
+        for ((rows, holders), _) in blocks.filter(|(_, part)| **part) {
+            let row = &constraints.rows[rows.start];
+            let expected = match row.kind {
+                Kind::Contact { pair } => &of_slaves[&pairs[pair].slave],
+                _ => &of_nodes[&row.terms[0].node],
+            };
+            assert_eq!(holders, expected);
+            differ.insert(holders.clone());
+        }
+        assert!(differ.len() > 3, "{differ:?}");
+    });
 }
 
 #[test]

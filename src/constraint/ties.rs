@@ -105,9 +105,9 @@ impl Ties {
         &self.own[own]
     }
 
-    /// Nodes on the interface of each group that is known here.
-    pub fn nodes(&self) -> impl Iterator<Item = &[u64]> {
-        self.known.values().map(Vec::as_slice)
+    /// Each group that is known here, by its subdomain (upper half) and number, with its nodes on the interface.
+    pub fn iter(&self) -> impl Iterator<Item = (u64, &[u64])> {
+        self.known.iter().map(|(&group, nodes)| (key(group), nodes.as_slice()))
     }
 
     /// Most nodes on the interface that a group has, on any rank; 0 if there are no groups.
@@ -121,8 +121,12 @@ impl Ties {
     }
 }
 
-fn pack((subdomain, number): (u32, u32), nodes: &[u64], message: &mut Vec<u64>) {
-    message.extend([u64::from(subdomain) << 32 | u64::from(number), nodes.len() as u64]);
+fn key((subdomain, number): (u32, u32)) -> u64 {
+    u64::from(subdomain) << 32 | u64::from(number)
+}
+
+fn pack(group: (u32, u32), nodes: &[u64], message: &mut Vec<u64>) {
+    message.extend([key(group), nodes.len() as u64]);
     message.extend(nodes);
 }
 
@@ -199,7 +203,7 @@ mod tests {
                                 ties.place(subdomain.id as u32, node(&group.on_interface[0])).unwrap();
                             assert_eq!(place, 0);
                             let nodes: Vec<u64> = group.on_interface.iter().map(node).collect();
-                            assert_eq!(ties.nodes().nth(number as usize), Some(&nodes[..]));
+                            assert_eq!(ties.iter().nth(number as usize).map(|(_, nodes)| nodes), Some(&nodes[..]));
                             assert_eq!(subdomain.body, 1, "the lower brick's cells are cubes");
                             own += 1;
                         }

@@ -220,7 +220,8 @@ impl TornProblem<'_> {
     fn close(&self, slack: Vec<f64>, u: &mut Torn) {
         let mut correction = slack.clone();
         self.constraints.violation(&mut correction);
-        self.coupling.borrow_mut().close(self.constraints, &slack, &mut correction);
+        let around = (self.gather, self.space);
+        self.coupling.borrow_mut().close(around, self.constraints, &slack, &mut correction);
         self.gather.add_transpose(1.0, &correction, u);
     }
 

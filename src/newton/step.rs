@@ -126,7 +126,7 @@ impl<'a> StepSolver<'a> {
     pub fn expect(&mut self, problem: &TornProblem, state: &State, kept: Vec<bool>) -> Vec<f64> {
         let mut lambda = vec![0.0; kept.len()];
         problem.gather.apply(&problem.unbalance(state), &mut lambda);
-        problem.coupling.borrow_mut().solve(&mut lambda, |row| kept[row]);
+        problem.coupling.borrow_mut().solve((problem.gather, problem.space), &mut lambda, |row| kept[row]);
         problem.laws().project_onto(&kept, &mut lambda);
         self.programs.expect(&self.coarse, kept);
         lambda

@@ -2,9 +2,10 @@
 //!
 //! Of `N` ranks each holds `owned / N + everywhere + N a_rank` bytes of an item. `owned` grows with the scene and is shared.
 //! `everywhere` is on every rank: where it grows with the scene, a machine of any size ends. It does for three items: contact
-//! rows that are coupled ([`is_coupled`]), the factors of the coarse problem, and the lists of clusters.
+//! rows that are coupled ([`kind`]), the factors of the coarse problem, and the lists of clusters.
 
 use super::memory::megabytes;
+use crate::constraint::links::FEW;
 use crate::record::forecast::HeldRow;
 use crate::scene::{Contact, Scene};
 
@@ -21,11 +22,15 @@ pub struct Item {
     pub a_rank: f64,
 }
 
-/// Whether all rows of a contact are in one block, which every rank at the contact holds: their conditions share nodes where
-/// meshes do not match, and on quadratic faces.
-pub fn is_coupled(scene: &Scene, contact: &Contact, meshes_match: bool) -> bool {
+/// Which of [`super::memory::Held::conditions`] the conditions of a contact are among. Rows are coupled, as conditions share nodes, where meshes
+/// do not match, and on quadratic faces. If they are few, every rank at the contact holds all of them.
+pub fn kind(scene: &Scene, contact: &Contact, meshes_match: bool, conditions: f64) -> usize {
     let is_quadratic = contact.surfaces().any(|surface| scene.body[&surface.body].element.degree() > 1);
-    is_quadratic || !meshes_match
+    match is_quadratic || !meshes_match {
+        false => 0,
+        true if conditions <= FEW as f64 => 1,
+        true => 2,
+    }
 }
 
 impl Item {

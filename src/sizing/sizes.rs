@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::held::is_coupled;
+use super::held::kind;
 use super::memory::{Held, Lengths, Memory, Numbers, PROCESS_MB};
 use crate::comm::exact::exact_sums;
 use crate::comm::{Comm, maximum};
@@ -79,18 +79,13 @@ pub fn memory(scene: &Scene, discrete: &Discrete, comm: &dyn Comm) -> Memory {
     let rows: Vec<_> = of_subdomains.chain(groups).chain(slots).map(|numbers| numbers.0).collect();
     let numbers = Numbers(exact_sums(comm, &rows));
     let largest = maximum(comm, &[lengths.iter().fold(0.0, |largest, lengths| lengths.factor.max(largest))])[0];
-    let coupled = scene.contact.values().zip(&contacts.rows);
-    let coupled = coupled.filter(|(contact, row)| is_coupled(scene, contact, row.rule != "mortar"));
-    let coupled = coupled.map(|(_, row)| row.conditions as f64).sum::<f64>();
+    let mut conditions = [0.0; 3];
+    for (contact, row) in scene.contact.values().zip(&contacts.rows) {
+        let count = row.conditions as f64;
+        conditions[kind(scene, contact, row.rule != "mortar", count)] += count;
+    }
     let [subdomains, coarse_blocks] = [decomposition.shares.total(), decomposition.clusters.total()].map(|n| n as f64);
-    let held = Held {
-        numbers,
-        subdomains,
-        coarse_blocks,
-        conditions: [contacts.pairs.total() as f64 - coupled, coupled],
-        surfaces: contacts.surfaces() as f64,
-        largest,
-    };
+    let held = Held { numbers, subdomains, coarse_blocks, conditions, surfaces: contacts.surfaces() as f64, largest };
     let items = held.items();
     Memory { items, numbers, cutting_mb: discrete.reading_mb.map_or(0.0, |mb| (mb - PROCESS_MB).max(0.0)) }
 }

@@ -2,6 +2,7 @@
 //! agreement with meshes that match.
 
 use crate::common::{assert_close, assert_residuals, number, scene_file, solve, solve_tightly, vector};
+use crate::ranks::assert_independent_of_ranks;
 use fetiplast::analytic::press_fit::PressFit;
 use serde_json::Value;
 
@@ -150,4 +151,50 @@ fn the_energy_of_a_press_fit_is_that_of_the_closed_form_whether_its_meshes_match
     let scene = scene_file(directory.path(), &press_fit(fit, [[3, 1], [2, 1]]));
     let summary = solve(2, &scene, &["solver.error=0.005"]).converged().summary();
     assert!(off(&summary).abs() < 0.005, "{:.1e}", off(&summary));
+}
+
+/// So many conditions that no rank holds all of them: a block that is pressed on another one stays uniform, and is the same on any ranks,
+/// whether both are alike or one is far softer.
+#[test]
+fn a_large_contact_in_parts_passes_a_uniform_pressure() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = scene_file(
+        directory.path(),
+        r#"
+        material.steel = { young = 210000.0, poisson = 0.3 }
+        material.other = { young = 210000.0, poisson = 0.3 }
+        [body.lower]
+        material = "steel"
+        element = "hex8"
+        brick = { origin = [0.0, 0.0, 0.0], size = [34.0, 34.0, 2.0], cells = [34, 34, 2] }
+        [body.upper]
+        material = "other"
+        element = "hex8"
+        brick = { origin = [0.0, 0.0, 2.0], size = [34.0, 34.0, 3.0], cells = [27, 27, 2] }
+        [support]
+        ground = { surface = "lower.zmin", fix = ["z"] }
+        low-x = { surface = "lower.xmin", fix = ["x"] }
+        low-y = { surface = "lower.ymin", fix = ["y"] }
+        high-x = { surface = "upper.xmin", fix = ["x"] }
+        high-y = { surface = "upper.ymin", fix = ["y"] }
+        [load.top]
+        surface = "upper.zmax"
+        traction = [0.0, 0.0, -100.0]
+        [contact.joint]
+        slave = "lower.zmax"
+        master = "upper.zmin"
+        [decomposition]
+        subdomains = 60
+        "#,
+    );
+    for young in [210000.0, 210.0] {
+        let sets = [&format!("material.other.young={young:?}"), "solver.qp_tolerance=1e-10"];
+        let summary = Value::Object(assert_independent_of_ranks(&file, &sets, &[1, 2, 5]));
+        let conditions = summary["contacts"][0]["conditions"].as_u64();
+        assert_eq!(conditions, Some(35 * 35), "{}", summary["contacts"]);
+        let energy = -0.5 * 100.0_f64.powi(2) * 34.0 * 34.0 * (2.0 / 210_000.0 + 3.0 / young);
+        assert_close("energy", number(&summary, "energy"), energy, 1e-7);
+        let most = 30.0;
+        assert!(number(&summary, "hessian_multiplications") <= most, "{}", summary["hessian_multiplications"]);
+    }
 }

@@ -3,8 +3,7 @@
 //! Multipliers live on every rank that holds their row, so `B'` is local. For `B` each subdomain fills its slots of
 //! the rows, neighbours exchange slots, and every holder adds a row's slots in subdomain order: the same bits anywhere.
 
-use std::cell::RefCell;
-
+use super::slots::Slots;
 use crate::comm::{Comm, Shares};
 use crate::constraint::{Constraints, Entry};
 use crate::feti::Torn;
@@ -12,71 +11,29 @@ use crate::work;
 
 /// The constraint matrix B of one rank.
 pub struct Gather<'a> {
-    comm: &'a dyn Comm,
     /// Coefficients of each own subdomain.
     entries: Vec<Vec<Entry>>,
     /// Local unknowns of each own subdomain.
     dofs: Vec<usize>,
-    slot_begin: Vec<u32>,
-    neighbours: Vec<Neighbour>,
-    buffers: RefCell<Buffers>,
-}
-
-/// A rank that shares rows with this one.
-struct Neighbour {
-    rank: usize,
-    /// Own slots that it needs, and its slots that are needed here; both in the order of the rows.
-    sends: Vec<u32>,
-    receives: Vec<u32>,
-}
-
-#[derive(Default)]
-struct Buffers {
-    slots: Vec<f64>,
-    outgoing: Vec<Vec<f64>>,
-    incoming: Vec<Vec<f64>>,
+    slots: Slots<'a>,
 }
 
 impl<'a> Gather<'a> {
     /// For subdomains with so many local unknowns each.
     pub fn new(comm: &'a dyn Comm, shares: &Shares, constraints: &Constraints, dofs: Vec<usize>) -> Self {
-        let rank = comm.rank();
-        let mut plan: Vec<(Vec<u32>, Vec<u32>)> = vec![Default::default(); comm.size()];
-        for (rows, subdomains) in constraints.blocks.iter().zip(&constraints.block_subdomains) {
-            let mut holders: Vec<usize> = subdomains.iter().map(|&s| shares.owner(s as usize)).collect();
-            holders.dedup();
-            for row in rows.clone() {
-                for slot in constraints.slots(row) {
-                    let owner = shares.owner(constraints.slot_subdomain[slot] as usize);
-                    if owner != rank {
-                        plan[owner].1.push(slot as u32);
-                        continue;
-                    }
-                    for &holder in holders.iter().filter(|&&h| h != rank) {
-                        plan[holder].0.push(slot as u32);
-                    }
-                }
-            }
-        }
-        let neighbours = plan
-            .into_iter()
-            .enumerate()
-            .filter(|(_, (sends, receives))| !sends.is_empty() || !receives.is_empty())
-            .map(|(rank, (sends, receives))| Neighbour { rank, sends, receives })
-            .collect();
-        Self {
-            comm,
-            entries: constraints.entries.clone(),
-            dofs,
-            slot_begin: constraints.slot_begin.clone(),
-            neighbours,
-            buffers: RefCell::default(),
-        }
+        let (begin, subdomains) = (constraints.slot_begin.clone(), &constraints.slot_subdomain);
+        let slots = Slots::new(comm, shares, constraints, begin, subdomains);
+        Self { entries: constraints.entries.clone(), dofs, slots }
     }
 
     /// Number of rows on this rank.
     pub fn rows(&self) -> usize {
-        self.slot_begin.len() - 1
+        self.slots.rows()
+    }
+
+    /// Local unknowns of an own subdomain.
+    pub fn dofs(&self, own: usize) -> usize {
+        self.dofs[own]
     }
 
     /// Coefficients of an own subdomain, by row.
@@ -151,32 +108,13 @@ impl<'a> Gather<'a> {
 
     /// Lets `fill` add the numbers of each own subdomain to its slots, `width` a slot, and hands the slots of each row to `take`, in
     /// subdomain order. One neighbour exchange.
-    pub fn exchange(&self, width: usize, fill: impl Fn(usize, &mut [f64]), mut take: impl FnMut(usize, &[f64])) {
-        let Buffers { slots, outgoing, incoming } = &mut *self.buffers.borrow_mut();
-        let count = self.slot_begin[self.rows()] as usize;
-        slots.clear();
-        slots.resize(width * count, 0.0);
-        for own in 0..self.entries.len() {
-            fill(own, slots);
-        }
-        let of = |slot: u32| width * slot as usize..width * (slot as usize + 1);
-        outgoing.resize_with(self.neighbours.len(), Vec::new);
-        incoming.resize_with(self.neighbours.len(), Vec::new);
-        for ((neighbour, out), into) in self.neighbours.iter().zip(&mut *outgoing).zip(&mut *incoming) {
-            out.clear();
-            neighbour.sends.iter().for_each(|&slot| out.extend_from_slice(&slots[of(slot)]));
-            into.resize(width * neighbour.receives.len(), 0.0);
-        }
-        let ranks: Vec<usize> = self.neighbours.iter().map(|n| n.rank).collect();
-        self.comm.exchange(&ranks, outgoing, incoming);
-        for (neighbour, data) in self.neighbours.iter().zip(&*incoming) {
-            for (&slot, values) in neighbour.receives.iter().zip(data.chunks_exact(width)) {
-                slots[of(slot)].copy_from_slice(values);
-            }
-        }
-        for row in 0..self.rows() {
-            take(row, &slots[width * self.slot_begin[row] as usize..width * self.slot_begin[row + 1] as usize]);
-        }
+    pub fn exchange(&self, width: usize, fill: impl Fn(usize, &mut [f64]), take: impl FnMut(usize, &[f64])) {
+        self.slots.exchange(width, |slots| (0..self.entries.len()).for_each(|own| fill(own, slots)), take);
+    }
+
+    /// The place of an entry among the slots of its row.
+    pub fn place(&self, entry: &Entry) -> usize {
+        entry.slot as usize - self.slots.of_row(entry.row as usize).start
     }
 }
 

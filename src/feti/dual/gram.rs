@@ -4,16 +4,18 @@ use crate::constraint::{Constraints, Term};
 use crate::sparse::cholesky::{Analysis, Factor, Lower, Precision, Workspace};
 use crate::work;
 
-/// The matrix of some rows that share nodes. Rows that are not kept take no part.
-pub struct Gram {
+/// The lower triangle of `B W B'` on some rows, column by column.
+pub struct Products {
     rows: Vec<usize>,
     column_begin: Vec<u32>,
-    /// Row and column of each entry of the lower triangle, column by column.
+    /// Place of the row of each entry; the diagonal comes first in its column.
     row_index: Vec<u32>,
-    column_index: Vec<u32>,
-    /// Unknowns of all coefficients.
-    sites: Vec<SlotUnknown>,
-    products: Vec<Product>,
+    values: Vec<f64>,
+}
+
+/// The inverse of such a matrix on rows that are kept. Others take no part.
+pub struct Gram {
+    products: Products,
     analysis: Analysis,
     workspace: Workspace,
     factor: Factor,
@@ -29,16 +31,6 @@ const ROUNDING: f64 = 1e-12;
 
 /// By how much the diagonal grows where there is no factor.
 const SHIFTS: [f64; 3] = [1e-10, 1e-8, 1e-6];
-
-/// Product of two coefficients of one block of `W`.
-struct Product {
-    /// Where it belongs in the matrix.
-    entry: u32,
-    /// Numbers of the coefficients.
-    factors: [u32; 2],
-    /// Twice where it stands for two, of two coefficients of one row.
-    value: f64,
-}
 
 /// Where a coefficient's unknown is.
 #[derive(Clone, Copy)]
@@ -107,59 +99,53 @@ pub fn coefficients(
     all
 }
 
-impl Gram {
-    /// Of these rows, ascending; `tied` says that `W` has blocks.
-    pub fn new(constraints: &Constraints, rows: Vec<usize>, tied: bool) -> Self {
+impl Products {
+    /// Of these rows, ascending; `tied` says that `W` has blocks, and `weight` is `W` between two unknowns of a block.
+    pub fn new(
+        constraints: &Constraints,
+        rows: Vec<usize>,
+        tied: bool,
+        weight: impl Fn(SlotUnknown, SlotUnknown) -> f64,
+    ) -> Self {
         let coefficients = coefficients(constraints, rows.iter().copied().enumerate(), tied);
-        let mut products = Vec::new();
-        let mut places: Vec<[u32; 2]> = (0..rows.len() as u32).map(|k| [k, k]).collect();
-        let mut first = 0;
+        let mut products: Vec<([u32; 2], f64)> = (0..rows.len() as u32).map(|k| ([k, k], 0.0)).collect();
         for same in coefficients.chunk_by(Coefficient::share_block) {
             for (k, a) in same.iter().enumerate() {
                 for (j, b) in same[..=k].iter().enumerate() {
+                    // One stands for two, of two coefficients of one row.
                     let times = if j < k && a.place == b.place { 2.0 } else { 1.0 };
-                    let factors = [first + k as u32, first + j as u32];
-                    products.push(Product { entry: 0, factors, value: times * a.value * b.value });
-                    places.push([b.place as u32, a.place as u32]);
+                    let value = times * a.value * b.value * weight(a.site, b.site);
+                    products.push(([b.place as u32, a.place as u32], value));
                 }
             }
-            first += same.len() as u32;
         }
-        places.sort_unstable();
-        places.dedup();
-        for product in &mut products {
-            let [row, column] = product.factors.map(|k| coefficients[k as usize].place as u32);
-            product.entry = places.binary_search(&[column, row]).expect("every product has its place") as u32;
+        work::each(products.len(), 4, size_of::<([u32; 2], f64)>());
+        // Stable: sums are in the order of the unknowns, whatever other rows there are.
+        products.sort_by_key(|product| product.0);
+        let mut entries: Vec<([u32; 2], f64)> = Vec::new();
+        for same in products.chunk_by(|a, b| a.0 == b.0) {
+            entries.push((same[0].0, same.iter().fold(0.0, |sum, product| sum + product.1)));
         }
-        let column_begin: Vec<u32> =
-            (0..=rows.len() as u32).map(|column| places.partition_point(|place| place[0] < column) as u32).collect();
-        let [column_index, row_index] = [0, 1].map(|k| places.iter().map(|place| place[k]).collect::<Vec<u32>>());
-        let analysis = Analysis::minimum_degree(Lower { column_begin: &column_begin, rows: &row_index });
-        Self {
-            column_begin,
-            sites: coefficients.iter().map(|c| c.site).collect(),
-            products,
-            workspace: Workspace::new([&analysis]),
-            factor: analysis.factor(Precision::Double),
-            analysis,
-            definite: false,
-            kept: vec![false; rows.len()],
-            values: vec![0.0; row_index.len()],
-            unknowns: vec![0.0; rows.len()],
-            row_index,
-            column_index,
-            rows,
-        }
+        let begin = |column: u32| entries.partition_point(|entry| entry.0[0] < column) as u32;
+        let column_begin = (0..=rows.len() as u32).map(begin).collect();
+        let (row_index, values) = entries.into_iter().map(|([_, row], value)| (row, value)).unzip();
+        Self { rows, column_begin, row_index, values }
     }
 
-    /// Frees what only another [`Gram::factorise`] would need: the factor is final.
-    pub fn settle(&mut self) {
-        (self.sites, self.products) = Default::default();
-    }
-
-    /// The rows.
-    pub fn rows(&self) -> &[usize] {
-        &self.rows
+    /// Of some of the rows, by their places, ascending.
+    pub fn principal(&self, places: &[u32]) -> Self {
+        let rows = places.iter().map(|&place| self.rows[place as usize]).collect();
+        let (mut column_begin, mut row_index, mut values) = (vec![0], Vec::new(), Vec::new());
+        for &column in places {
+            for entry in self.column(column as usize) {
+                if let Ok(place) = places.binary_search(&self.row_index[entry]) {
+                    row_index.push(place as u32);
+                    values.push(self.values[entry]);
+                }
+            }
+            column_begin.push(row_index.len() as u32);
+        }
+        Self { rows, column_begin, row_index, values }
     }
 
     /// Whether any two rows share an unknown.
@@ -167,32 +153,61 @@ impl Gram {
         self.row_index.len() > self.rows.len()
     }
 
-    /// Factorises on the kept rows, `weight` being `W` between two unknowns of a block. Where rows depend on each other, as friction
-    /// rows do where supports hold the slave's side of many of them, the diagonal is made larger by some rounding: what this adds to
-    /// the inverse is nearly in the kernel of `B'`.
-    pub fn factorise(&mut self, weight: impl Fn(SlotUnknown, SlotUnknown) -> f64, kept: impl Fn(usize) -> bool) {
-        self.kept.iter_mut().zip(&self.rows).for_each(|(k, &row)| *k = kept(row));
-        self.values.fill(0.0);
-        work::each(self.products.len(), 2, size_of::<Product>());
-        for Product { entry, factors, value } in &self.products {
-            let [a, b] = factors.map(|k| self.sites[k as usize]);
-            self.values[*entry as usize] += value * weight(a, b);
+    fn column(&self, column: usize) -> std::ops::Range<usize> {
+        self.column_begin[column] as usize..self.column_begin[column + 1] as usize
+    }
+
+    /// Each entry with the places of its column and its row.
+    fn entries(&self) -> impl Iterator<Item = (usize, [usize; 2])> {
+        let of = move |column| self.column(column).map(move |entry| (entry, [column, self.row_index[entry] as usize]));
+        (0..self.rows.len()).flat_map(of)
+    }
+}
+
+impl Gram {
+    /// Analyses a matrix; there is no factor before [`Gram::factorise`].
+    pub fn new(products: Products) -> Self {
+        let Products { rows, column_begin, row_index, values } = &products;
+        let analysis = Analysis::minimum_degree(Lower { column_begin, rows: row_index });
+        Self {
+            workspace: Workspace::new([&analysis]),
+            factor: analysis.factor(Precision::Double),
+            analysis,
+            definite: false,
+            kept: vec![false; rows.len()],
+            values: vec![0.0; values.len()],
+            unknowns: vec![0.0; rows.len()],
+            products,
         }
-        for ((value, &row), &column) in self.values.iter_mut().zip(&self.row_index).zip(&self.column_index) {
-            if !(self.kept[row as usize] && self.kept[column as usize]) {
-                *value = 0.0;
-            }
-        }
-        // The identity fills the place of the others: one analysis serves all sets.
-        for (column, _) in self.kept.iter().enumerate().filter(|(_, kept)| !**kept) {
-            self.values[self.column_begin[column] as usize] = 1.0;
+    }
+
+    /// Of another matrix on the same rows, whose entries are in the same places.
+    pub fn renew(self, products: Products) -> Self {
+        debug_assert!(self.products.rows == products.rows && self.products.row_index == products.row_index);
+        Self { products, ..self }
+    }
+
+    /// The rows.
+    pub fn rows(&self) -> &[usize] {
+        &self.products.rows
+    }
+
+    /// Factorises on the kept rows. Where rows depend on each other, as friction rows do where supports hold the slave's side of many of
+    /// them, the diagonal is made larger by some rounding: what this adds to the inverse is nearly in the kernel of `B'`.
+    pub fn factorise(&mut self, kept: impl Fn(usize) -> bool) {
+        let products = &self.products;
+        self.kept.iter_mut().zip(&products.rows).for_each(|(k, &row)| *k = kept(row));
+        for (entry, [column, row]) in products.entries() {
+            // The identity fills the place of the others: one analysis serves all sets.
+            let other = if row == column { 1.0 } else { 0.0 };
+            self.values[entry] = if self.kept[row] && self.kept[column] { products.values[entry] } else { other };
         }
         self.definite = self.factorises();
         for shift in SHIFTS {
             if self.definite {
                 break;
             }
-            let diagonal = &self.column_begin[..self.rows.len()];
+            let diagonal = &self.products.column_begin[..self.products.rows.len()];
             diagonal.iter().for_each(|&entry| self.values[entry as usize] *= 1.0 + shift);
             self.definite = self.factorises();
         }
@@ -200,15 +215,17 @@ impl Gram {
 
     /// Factorises the values. False if they are not definite, to rounding.
     fn factorises(&mut self) -> bool {
-        let lower = Lower { column_begin: &self.column_begin, rows: &self.row_index };
-        let diagonal = |unknown: usize| self.values[self.column_begin[unknown] as usize];
+        let Products { column_begin, row_index, .. } = &self.products;
+        let lower = Lower { column_begin, rows: row_index };
+        let diagonal = |unknown: usize| self.values[column_begin[unknown] as usize];
         let found = self.workspace.factorise(&self.analysis, lower, &self.values, &mut self.factor);
         found.is_ok() && self.analysis.least_pivot(&self.factor, diagonal) > ROUNDING
     }
 
     /// `y = (B W B')^-1 x` on its rows; zero on those that are not kept. Not a number if there is no inverse.
     pub fn solve(&mut self, x: &[f64], y: &mut [f64]) {
-        for ((unknown, &row), &kept) in self.unknowns.iter_mut().zip(&self.rows).zip(&self.kept) {
+        let rows = &self.products.rows;
+        for ((unknown, &row), &kept) in self.unknowns.iter_mut().zip(rows).zip(&self.kept) {
             *unknown = if kept { x[row] } else { 0.0 };
         }
         if self.definite {
@@ -216,19 +233,19 @@ impl Gram {
         } else {
             self.unknowns.fill(f64::NAN);
         }
-        for ((&unknown, &row), &kept) in self.unknowns.iter().zip(&self.rows).zip(&self.kept) {
+        for ((&unknown, &row), &kept) in self.unknowns.iter().zip(rows).zip(&self.kept) {
             y[row] = if kept { unknown } else { 0.0 };
         }
     }
 
-    /// `y -= B B' x` on its rows, kept or not, where `W` has no blocks; `y` is by place.
+    /// `y -= B W B' x` on its rows, kept or not; `y` is by place.
     pub fn subtract_product(&self, x: &[f64], y: &mut [f64]) {
-        work::each(self.products.len(), 4, size_of::<Product>());
-        for Product { entry, value, .. } in &self.products {
-            let [a, b] = [&self.row_index, &self.column_index].map(|index| index[*entry as usize] as usize);
-            y[a] -= value * x[self.rows[b]];
+        let Products { rows, values, .. } = &self.products;
+        work::each(values.len(), 4, size_of::<f64>());
+        for (entry, [a, b]) in self.products.entries() {
+            y[a] -= values[entry] * x[rows[b]];
             if a != b {
-                y[b] -= value * x[self.rows[a]];
+                y[b] -= values[entry] * x[rows[a]];
             }
         }
     }
@@ -240,7 +257,7 @@ mod tests {
     use faer::prelude::Solve;
 
     use super::*;
-    use crate::fixture::{assert_close, column, not_matching, on_ranks};
+    use crate::fixture::{assert_close, column, long_contact, on_ranks};
 
     /// Weights that depend on the unknown alone.
     fn weight(term: &Term) -> f64 {
@@ -249,16 +266,20 @@ mod tests {
 
     #[test]
     fn solves_and_multiplies_as_dense_matrices_do_on_all_rows_and_on_some() {
-        on_ranks(&not_matching(&[]), 1, |setup| {
+        on_ranks(&long_contact(), 1, |setup| {
             let constraints = &setup.discrete.constraints;
-            let largest = constraints.blocks.iter().max_by_key(|rows| rows.len()).expect("there are rows").clone();
-            let n = largest.len();
-            let mut gram = Gram::new(constraints, largest.clone().collect(), false);
-            assert!(gram.is_coupled() && n > 100, "{n}");
+            let parts = constraints.blocks.iter().zip(&constraints.is_part).filter(|(_, part)| **part);
+            let large: Vec<usize> = parts.flat_map(|(rows, _)| rows.clone()).collect();
+            let n = large.len();
+            let products = |weight: &dyn Fn(SlotUnknown) -> f64| {
+                Products::new(constraints, large.clone(), false, |site, _| weight(site))
+            };
+            let plain = products(&|_| 1.0);
+            assert!(plain.is_coupled() && n > 100, "{n}");
             // Dense, by the rows' own terms.
             let product = |weighted: bool| {
                 Mat::from_fn(n, n, |i, j| {
-                    let [one, other] = [i, j].map(|k| &constraints.rows[largest.start + k].terms);
+                    let [one, other] = [i, j].map(|k| &constraints.rows[large[k]].terms);
                     let same = |a: &Term, b: &Term| (a.subdomain, a.node, a.axis) == (b.subdomain, b.node, b.axis);
                     let factor = |a: &Term| if weighted { weight(a) } else { 1.0 };
                     let pairs = one.iter().flat_map(|a| other.iter().filter(move |b| same(a, b)).map(move |b| (a, b)));
@@ -266,29 +287,41 @@ mod tests {
                 })
             };
             let mut weights = vec![[0.0; 3]; constraints.slot_subdomain.len()];
-            for row in largest.clone() {
+            for &row in &large {
                 let parts = constraints.rows[row].terms.chunk_by(Term::share_slot);
                 for (slot, part) in constraints.slots(row).zip(parts) {
                     part.iter().for_each(|term| weights[slot][term.axis] = weight(term));
                 }
             }
             let x = setup.multipliers(1);
+            let weighted = products(&|site| weights[site.slot as usize][site.axis as usize]);
+            // Every other row alone.
+            let places: Vec<u32> = (0..n as u32).step_by(2).collect();
+            let half = weighted.principal(&places);
+            assert_eq!(half.rows, places.iter().map(|&k| large[k as usize]).collect::<Vec<_>>());
+            let dense = product(true);
+            for (entry, [column, row]) in half.entries() {
+                let expected = dense[(places[row] as usize, places[column] as usize)];
+                assert!((half.values[entry] - expected).abs() < 1e-14 * dense[(0, 0)], "{row}, {column}");
+            }
+            let mut gram = Gram::new(weighted);
             for some in [false, true] {
                 let kept = |row: usize| !some || !row.is_multiple_of(3);
-                gram.factorise(|site, _| weights[site.slot as usize][site.axis as usize], kept);
+                gram.factorise(kept);
                 let mut y = vec![f64::NAN; x.len()];
                 gram.solve(&x, &mut y);
-                let list: Vec<usize> = (0..n).filter(|k| kept(largest.start + k)).collect();
+                let list: Vec<usize> = (0..n).filter(|&k| kept(large[k])).collect();
                 let dense = product(true);
                 let dense = Mat::from_fn(list.len(), list.len(), |i, j| dense[(list[i], list[j])]);
-                let rhs: Vec<f64> = list.iter().map(|k| x[largest.start + k]).collect();
-                let found: Vec<f64> = list.iter().map(|k| y[largest.start + k]).collect();
+                let rhs: Vec<f64> = list.iter().map(|&k| x[large[k]]).collect();
+                let found: Vec<f64> = list.iter().map(|&k| y[large[k]]).collect();
                 assert_close(&column(&found), &dense.partial_piv_lu().solve(column(&rhs)), 1e-11);
-                assert!(largest.clone().all(|row| kept(row) || y[row] == 0.0));
+                assert!(large.iter().all(|&row| kept(row) || y[row] == 0.0));
             }
             let mut y = vec![0.0; n];
-            gram.subtract_product(&x, &mut y);
-            assert_close(&column(&y), &(-product(false) * column(&x[largest.clone()])), 1e-12);
+            Gram::new(plain).subtract_product(&x, &mut y);
+            let of_rows: Vec<f64> = large.iter().map(|&row| x[row]).collect();
+            assert_close(&column(&y), &(-product(false) * column(&of_rows)), 1e-12);
         });
     }
 }

@@ -3,10 +3,12 @@
 
 pub mod deluxe;
 pub mod flexibility;
+pub mod patches;
 pub mod scaling;
 
 use self::deluxe::Deluxe;
 use self::flexibility::Flexibility;
+use self::patches::Patches;
 use self::scaling::Scaling;
 use super::Torn;
 use super::dual::Interconnection;
@@ -27,6 +29,8 @@ pub struct Preconditioner<'a> {
     schur: Schur,
     /// Scaling of the rows.
     scaling: Scaling,
+    /// Who holds parts of large components of conditions, if there are any.
+    patches: Option<Patches<'a>>,
     /// Scaling of faces beside weak subdomains.
     deluxe: Deluxe<'a>,
     /// Place among the boundary unknowns of each own subdomain's coefficients, in the order of the rows.
@@ -54,6 +58,7 @@ impl<'a> Preconditioner<'a> {
             gather,
             schur,
             scaling: Scaling::default(),
+            patches: Patches::new(connection.tree.comm(), connection.tree.shares(), constraints),
             deluxe,
             places,
             forces: displacements.clone(),
@@ -85,7 +90,11 @@ impl<'a> Preconditioner<'a> {
     ) -> Result<(), NotDefinite> {
         let stiffness = (0..subdomains.len()).map(|own| operator.inverse.stiffness(own));
         let stiffness = stiffness.map(|(symbolic, values)| (&symbolic.pattern, values));
-        self.scaling = timer.time("scaling", || Scaling::new(constraints, self.gather, stiffness));
+        self.scaling = timer.time("scaling", || {
+            let before = std::mem::take(&mut self.scaling);
+            let patches = self.patches.as_ref().map(|patches| (patches, before));
+            Scaling::new(constraints, self.gather, patches, stiffness)
+        });
         if !changes.is_any_weak && !self.deluxe.is_active() {
             return Ok(());
         }
@@ -120,8 +129,17 @@ impl<'a> Preconditioner<'a> {
             // Only boundary unknowns are read.
             boundary.iter().zip(forces).for_each(|(&dof, x)| torn[dof as usize] = *x);
         }
-        self.gather.apply(&self.torn, &mut self.rows);
-        self.scaling.solve(&self.rows, y);
+        match &self.patches {
+            Some(patches) => {
+                patches.sum(self.gather, self.scaling.patches(), &self.torn, &mut self.rows);
+                self.scaling.solve(&self.rows, y);
+                patches.copy(&self.rows, y);
+            }
+            None => {
+                self.gather.apply(&self.torn, &mut self.rows);
+                self.scaling.solve(&self.rows, y);
+            }
+        }
         if self.deluxe.is_active() {
             self.gather.apply(&self.parts, &mut self.rows);
             y.iter_mut().zip(&self.rows).for_each(|(y, part)| *y += part);
@@ -139,8 +157,8 @@ impl<'a> Preconditioner<'a> {
         timer.time("preconditioner", || self.mend(&defect, u));
     }
 
-    /// Adds to a torn displacement what closes the rows' `defect = c - B u`: `B_D' defect` on the boundary and, for
-    /// Dirichlet, the interior that follows it without force. Local.
+    /// Adds to a torn displacement what closes the rows' `defect = c - B u`, of large components nearly: `B_D' defect` on the boundary and,
+    /// for Dirichlet, the interior that follows it without force. Local.
     pub fn mend(&mut self, defect: &[f64], u: &mut Torn) {
         self.displace(defect);
         self.schur.extend(&self.displacements, u);
@@ -151,6 +169,7 @@ impl<'a> Preconditioner<'a> {
         self.scaling.solve(x, &mut self.rows);
         for (own, t) in self.displacements.iter_mut().enumerate() {
             t.fill(0.0);
+            self.scaling.solve_near(own, x, &mut self.rows);
             work::each(self.places[own].len(), 2, size_of::<Entry>());
             for (entry, &place) in self.gather.entries(own).iter().zip(&self.places[own]) {
                 t[place as usize] += entry.value * self.rows[entry.row as usize];

@@ -2,14 +2,16 @@
 //!
 //! `B D^-1 B'` is block diagonal over the blocks of rows, so unequal stiffness on both sides of an interface, or of a
 //! contact, is weighted exactly (Rixen and Farhat 1999; Klawonn, Rheinbach 2007 in matrix form). Inverses of small blocks
-//! are kept dense, of large ones (contact of meshes that do not match) as sparse factors.
+//! are kept dense, of larger ones as sparse factors. Of large components of conditions, whose blocks are parts, each subdomain has one near
+//! it ([`super::patches`]).
 
 use std::ops::Range;
 
 use super::flexibility::Flexibility;
+use super::patches::Patches;
 use crate::constraint::Constraints;
 use crate::feti::dual::gather::Gather;
-use crate::feti::dual::gram::{Coefficient, Gram, coefficients};
+use crate::feti::dual::gram::{Coefficient, Gram, Products, coefficients};
 use crate::sparse::pattern::Pattern;
 use crate::work;
 
@@ -26,33 +28,39 @@ pub struct Scaling {
     /// Inverses of the small blocks, row by row, one behind the other.
     inverses: Vec<f64>,
     large: Vec<Gram>,
+    /// Of own subdomains that hold parts of large components.
+    patches: Vec<Option<Gram>>,
 }
 
 impl Scaling {
-    /// From patterns and lower values of the own subdomains' stiffness matrices, on all rows. Takes the neighbour exchanges of
+    /// From patterns and lower values of the own subdomains' stiffness matrices, on all rows; `patches` with what was before, if there are any. Takes the neighbour exchanges of
     /// [`Flexibility::new`].
     pub fn new<'s>(
         constraints: &Constraints,
         gather: &Gather,
+        patches: Option<(&Patches, Self)>,
         stiffness: impl Iterator<Item = (&'s Pattern, &'s [f64])>,
     ) -> Self {
         let flexibility = Flexibility::new(constraints, gather, stiffness);
-        let (small, large): (Vec<_>, Vec<_>) = constraints.blocks.iter().cloned().partition(|rows| rows.len() <= SMALL);
+        let whole = constraints.blocks.iter().zip(&constraints.is_part).filter(|(_, part)| !**part);
+        let (small, large): (Vec<_>, Vec<_>) =
+            whole.map(|(rows, _)| rows.clone()).partition(|rows| rows.len() <= SMALL);
         let mut inverses = Vec::new();
         for rows in &small {
             inverses.extend(invert(block_matrix(constraints, rows.clone(), &flexibility, |_| true), rows.len()));
         }
-        let factor = |rows: Range<usize>| {
-            let changes = changes(constraints, rows.clone());
-            let mut gram = Gram::new(constraints, rows.collect(), true);
-            gram.factorise(|a, b| flexibility.between(a, b), |_| true);
-            if !changes {
-                gram.settle();
-            }
-            gram
-        };
-        let large = large.into_iter().map(factor).collect();
-        Self { flexibility, blocks: small, inverses, large }
+        let products =
+            |rows: Range<usize>| Products::new(constraints, rows.collect(), true, |a, b| flexibility.between(a, b));
+        let large = large.into_iter().map(|rows| Gram::new(products(rows))).collect();
+        let patches =
+            patches.map_or_else(Vec::new, |(patches, before)| patches.grams(constraints, &flexibility, before.patches));
+        let mut result = Self { flexibility, blocks: small, inverses, large, patches };
+        result.grams().for_each(|gram| gram.factorise(|_| true));
+        result
+    }
+
+    fn grams(&mut self) -> impl Iterator<Item = &mut Gram> {
+        self.large.iter_mut().chain(self.patches.iter_mut().flatten())
     }
 
     /// From now on only the kept rows count, the others get zero. Only rows of inequalities may come and go. Local.
@@ -66,9 +74,9 @@ impl Scaling {
             }
             at = end;
         }
-        for gram in &mut self.large {
+        for gram in self.grams() {
             if changes(constraints, gram.rows()[0]..gram.rows()[gram.rows().len() - 1] + 1) {
-                gram.factorise(|a, b| self.flexibility.between(a, b), &kept);
+                gram.factorise(&kept);
             }
         }
     }
@@ -78,7 +86,19 @@ impl Scaling {
         &self.flexibility
     }
 
-    /// `y = (B D^-1 B')^-1 x`. Local.
+    /// The inverses of [`Patches::grams`].
+    pub fn patches(&mut self) -> &mut [Option<Gram>] {
+        &mut self.patches
+    }
+
+    /// `y = A_s^-1 R_s x` in the rows of parts that an own subdomain holds, if it holds any. Local.
+    pub fn solve_near(&mut self, own: usize, x: &[f64], y: &mut [f64]) {
+        if let Some(gram) = self.patches.get_mut(own).and_then(Option::as_mut) {
+            gram.solve(x, y);
+        }
+    }
+
+    /// `y = (B D^-1 B')^-1 x` in the rows that are not of parts. Local.
     pub fn solve(&mut self, x: &[f64], y: &mut [f64]) {
         let mut at = 0;
         work::each(self.inverses.len(), 2, size_of::<f64>());

@@ -208,16 +208,18 @@ fn complete(comm: &dyn Comm, discrete: &Discrete, rows: &mut [[u64; 4]]) {
     let blocks = constraints.blocks.iter().zip(&constraints.block_subdomains);
     let (mut own, mut foreign) = (HashMap::new(), vec![Vec::new(); comm.size()]);
     for (block, subdomains) in blocks {
-        let node = block.clone().map(|row| lowest_node(&constraints.rows[row])).min().unwrap_or_default();
+        let name = constraints.name(block);
         match shares.owner(subdomains[0] as usize) {
             owner if owner == comm.rank() => {
-                own.insert(node, block.clone());
+                own.insert(name, block.clone());
             }
-            owner => foreign[owner].push((node, block.clone())),
+            owner => foreign[owner].push((name, block.clone())),
         }
     }
-    let wishes = foreign.iter().map(|blocks| blocks.iter().map(|(node, _)| *node).collect()).collect();
-    let answer = |wish: Vec<u64>| wish.iter().flat_map(|node| rows[own[node].clone()].concat()).collect();
+    let wishes = foreign.iter().map(|blocks| blocks.iter().flat_map(|(name, _)| *name).collect()).collect();
+    let answer = |wish: Vec<u64>| {
+        wish.as_chunks().0.iter().flat_map(|name: &[u64; 2]| rows[own[name].clone()].concat()).collect()
+    };
     let answers: Vec<Vec<u64>> = comm.all_to_all(wishes).into_iter().map(answer).collect();
     for (blocks, answers) in foreign.into_iter().zip(comm.all_to_all(answers)) {
         let of_blocks = blocks.into_iter().flat_map(|(_, block)| block);

@@ -15,7 +15,7 @@ mod tests;
 
 use self::parts::Parts;
 use self::structured::Structured;
-use super::held::is_coupled;
+use super::held::kind;
 use super::memory::{Held, Lengths, Memory, Numbers, megabytes};
 use crate::decomposition::{BodyMesh, Cut, bricks, tetrahedra};
 use crate::element::Kind;
@@ -120,7 +120,7 @@ impl<'a> Counted<'a> {
         }
         let conditions = self.conditions();
         // Of nodes with one copy for the most part, on both sides.
-        numbers += Numbers::of_slots(self.supported() as f64 + 3.0 * (conditions[0] + conditions[1]));
+        numbers += Numbers::of_slots(self.supported() as f64 + 3.0 * conditions.iter().sum::<f64>());
         let is_cut_at_once = |body: &&BodyMesh| matches!(self.cut, Cut::Parts(_)) || body.brick().is_none();
         let elements = self.bodies.iter().filter(is_cut_at_once).map(|body| body.counts().elements as f64);
         let surfaces = self.scene.contact.values().flat_map(Contact::surfaces).count() as f64;
@@ -140,14 +140,14 @@ impl<'a> Counted<'a> {
         self.scene.body.keys().zip(&self.shapes).map(on).fold(0, u64::saturating_add)
     }
 
-    /// Most conditions that contacts can have: of those whose rows are in small blocks, and of the coupled ones.
-    fn conditions(&self) -> [f64; 2] {
-        let mut conditions = [0.0; 2];
+    /// Most conditions that contacts can have, by their [`kind`].
+    fn conditions(&self) -> [f64; 3] {
+        let mut conditions = [0.0; 3];
         for contact in self.scene.contact.values() {
             let is_rigid = contact.surfaces().nth(1).is_none();
             let meshes_match = is_rigid || contacts::count(self.scene, contact).is_some();
-            let of = usize::from(is_coupled(self.scene, contact, meshes_match));
-            conditions[of] += contact.surfaces().next().map_or(0.0, |slave| self.nodes_on(slave) as f64);
+            let count = contact.surfaces().next().map_or(0.0, |slave| self.nodes_on(slave) as f64);
+            conditions[kind(self.scene, contact, meshes_match, count)] += count;
         }
         conditions
     }

@@ -44,6 +44,11 @@ impl<'a> Tree<'a> {
         Self { comm, own: owned(comm.rank()).len(), levels, clusters, shares: shares.clone() }
     }
 
+    /// Subdomains of each rank.
+    pub fn shares(&self) -> &Shares {
+        &self.shares
+    }
+
     /// The rank that owns a subdomain.
     pub fn home(&self, subdomain: usize) -> usize {
         self.shares.owner(subdomain)
