@@ -39,6 +39,8 @@ fn friction_is_that_of_closed_forms() {
     let run = verify(2, &cases.each_ref().map(String::as_str));
     assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
     assert!(run.summary()["cases"].as_array().unwrap().len() >= 2 * cases.len());
+    let run = verify(2, &["friction-cylinder", "--element", "tet4"]);
+    assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
 }
 
 #[test]
