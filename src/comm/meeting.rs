@@ -25,10 +25,7 @@ pub fn look_up<const N: usize>(
     let ranks = comm.size();
     let mut outgoing = vec![Vec::new(); ranks];
     for (key, value) in known {
-        let message = &mut outgoing[home(&key, ranks)];
-        message.extend(key);
-        message.push(value.len() as u64);
-        message.extend(value);
+        pack(key, &value, &mut outgoing[home(&key, ranks)]);
     }
     let mut directory: HashMap<[u64; N], Vec<u64>> = HashMap::new();
     for report in comm.all_to_all(outgoing) {
@@ -42,9 +39,7 @@ pub fn look_up<const N: usize>(
         let mut message = Vec::new();
         for key in wish.as_chunks::<N>().0 {
             if let Some(value) = directory.get(key) {
-                message.extend(key);
-                message.push(value.len() as u64);
-                message.extend(value);
+                pack(*key, value, &mut message);
             }
         }
         message
@@ -107,8 +102,15 @@ fn tally<K: Hash + Eq>(counts: impl Iterator<Item = (K, u64)>) -> HashMap<K, u64
     sums
 }
 
+/// Adds a key with its values to a message.
+pub fn pack<const N: usize>(key: [u64; N], values: &[u64], message: &mut Vec<u64>) {
+    message.extend(key);
+    message.push(values.len() as u64);
+    message.extend(values);
+}
+
 /// Goes through keys with their values, packed one behind the other.
-fn each_packed<const N: usize>(message: &[u64], mut tell: impl FnMut([u64; N], &[u64])) {
+pub fn each_packed<const N: usize>(message: &[u64], mut tell: impl FnMut([u64; N], &[u64])) {
     let mut rest = message;
     while let Some((key, behind)) = rest.split_first_chunk::<N>() {
         let (count, behind) = behind.split_first().expect("messages are whole");

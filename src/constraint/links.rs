@@ -11,7 +11,7 @@ use super::JUMP;
 use super::components::Components;
 use super::reach::{Reach, rounds};
 use super::ties::Ties;
-use crate::comm::meeting::{ask, home, look_up};
+use crate::comm::meeting::{ask, each_packed, home, look_up, pack};
 use crate::comm::{Comm, maximum, sums};
 use crate::contact::ContactPair;
 use crate::contact::known::Pairs;
@@ -95,47 +95,35 @@ impl Linked {
         let linked = || decomposition.interface.iter().filter_map(|node| Some((node, *names.get(&node.node)?)));
         let small = linked().filter(|(node, _)| !is_large(node.node)).map(|(_, name)| name);
         let members = members(comm, small.collect());
-        let owners = |holders: &Vec<u32>| {
-            let mut ranks: Vec<usize> = holders.iter().map(|&subdomain| decomposition.owner(subdomain)).collect();
-            ranks.dedup();
-            ranks
+        let ranks = |holders: Option<&Vec<u32>>, name: u64| {
+            holders.map_or_else(|| members[&name].clone(), |holders| decomposition.owners(holders))
         };
         let mut messages: [Vec<Vec<u64>>; 6] = std::array::from_fn(|_| vec![Vec::new(); comm.size()]);
         let [nodes, young, pairs, ties, of_nodes, of_slaves] = &mut messages;
         // The rank of the lowest copy of a node tells of it and of its conditions.
-        let is_told = |node: &InterfaceNode| decomposition.own_index(node.copies[0]).is_some();
-        for (node, name) in linked().filter(|(node, _)| is_told(node)) {
+        for (node, name) in linked().filter(|(node, _)| decomposition.tells(node.node)) {
             let holders = self.reach.nodes.get(&node.node);
-            for rank in holders.map_or_else(|| members[&name].clone(), owners) {
+            for rank in ranks(holders, name) {
                 node.pack(&mut nodes[rank]);
                 let of = |&copy: &u32| [u64::from(copy), self.stiffness.of(copy).to_bits()];
                 young[rank].extend(node.copies.iter().flat_map(of));
-                holders.iter().for_each(|holders| pack(node.node, holders, &mut of_nodes[rank]));
+                holders.iter().for_each(|holders| pack([node.node], &words(holders), &mut of_nodes[rank]));
             }
         }
         for (slave, holders) in &self.reach.slaves {
-            owners(holders).into_iter().for_each(|rank| pack(*slave, holders, &mut of_slaves[rank]));
+            let ranks = decomposition.owners(holders).into_iter();
+            ranks.for_each(|rank| pack([*slave], &words(holders), &mut of_slaves[rank]));
         }
-        let told: HashMap<u64, u64> =
-            linked().filter(|(node, _)| is_told(node)).map(|(node, name)| (node.node, name)).collect();
-        for (number, pair) in known.iter() {
-            let Some(name) = told.get(&pair.slave) else { continue };
-            let ranks = self.reach.slaves.get(&pair.slave).map_or_else(|| members[name].clone(), owners);
+        for (number, pair) in known.iter().filter(|(_, pair)| decomposition.tells(pair.slave)) {
+            let ranks = ranks(self.reach.slaves.get(&pair.slave), names[&pair.slave]);
             ranks.into_iter().for_each(|rank| known.pack(number, &mut pairs[rank]));
         }
-        // Of nodes that have tied ones in own subdomains, others may be told by other ranks.
-        let first = decomposition.subdomains.first().map_or(0, |subdomain| subdomain.id as u32);
-        let tied: BTreeSet<[u64; 1]> = self.ties.iter().flat_map(|(_, nodes)| nodes.iter().map(|&n| [n])).collect();
-        let words = |holders: &Vec<u32>| holders.iter().map(|&s| u64::from(s)).collect();
-        let reached = self.reach.nodes.iter().map(|(node, holders)| ([*node], words(holders)));
-        let reached = look_up(comm, reached, tied);
-        let reaches = |rank: usize, node: u64| {
-            reached.get(&[node]).is_some_and(|of| of.iter().any(|&s| decomposition.owner(s as u32) == rank))
-        };
+        let reached = self.reached_groups(comm, decomposition);
         let is_member = |rank: usize, node: u64| {
-            let of_component = names.get(&node).and_then(|name| members.get(name));
-            of_component.is_some_and(|ranks| ranks.binary_search(&rank).is_ok()) || reaches(rank, node)
+            let of_component = names.get(&node).and_then(|name| members.get(name)).or_else(|| reached.get(&node));
+            of_component.is_some_and(|ranks| ranks.binary_search(&rank).is_ok())
         };
+        let first = decomposition.subdomains.first().map_or(0, |subdomain| subdomain.id as u32);
         for (rank, message) in ties.iter_mut().enumerate() {
             self.ties.pack(first, |node| is_member(rank, node), message);
         }
@@ -146,25 +134,34 @@ impl Linked {
         self.stiffness.known.extend(young.map(|&[subdomain, bits]| (subdomain as u32, f64::from_bits(bits))));
         pairs.iter().for_each(|message| known.unpack(message));
         self.ties.unpack(ties);
-        of_nodes.iter().for_each(|message| unpack(message, &mut self.reach.nodes));
-        of_slaves.iter().for_each(|message| unpack(message, &mut self.reach.slaves));
+        let Reach { nodes, slaves } = &mut self.reach;
+        for (messages, all) in [(of_nodes, nodes), (of_slaves, slaves)] {
+            let mut add = |[node]: [u64; 1], holders: &[u64]| _ = all.insert(node, subdomains(holders));
+            messages.iter().for_each(|message| each_packed(message, &mut add));
+        }
+    }
+
+    /// The ranks that hold nodes of the groups that are known here, where they are in large components: others may tell of them.
+    /// Collective.
+    fn reached_groups(&self, comm: &dyn Comm, decomposition: &Decomposition) -> HashMap<u64, Vec<usize>> {
+        if !self.has_large {
+            return HashMap::new();
+        }
+        let wanted: BTreeSet<[u64; 1]> = self.ties.iter().flat_map(|(_, nodes)| nodes.iter().map(|&n| [n])).collect();
+        let reached = self.reach.nodes.iter().map(|(node, holders)| ([*node], words(holders)));
+        let found = look_up(comm, reached, wanted).into_iter();
+        found.map(|([node], holders)| (node, decomposition.owners(&subdomains(&holders)))).collect()
     }
 }
 
-/// A node and what holds it, as numbers, for sending.
-fn pack(node: u64, holders: &[u32], message: &mut Vec<u64>) {
-    message.extend([node, holders.len() as u64]);
-    message.extend(holders.iter().map(|&subdomain| u64::from(subdomain)));
+/// Subdomains as words of a message.
+fn words(subdomains: &[u32]) -> Vec<u64> {
+    subdomains.iter().map(|&subdomain| u64::from(subdomain)).collect()
 }
 
-/// Adds what [`pack`] has put one behind the other.
-fn unpack(message: &[u64], all: &mut HashMap<u64, Vec<u32>>) {
-    let mut rest = message;
-    while let [node, count, behind @ ..] = rest {
-        let (holders, behind) = behind.split_at(*count as usize);
-        all.insert(*node, holders.iter().map(|&subdomain| subdomain as u32).collect());
-        rest = behind;
-    }
+/// Back from [`words`].
+fn subdomains(words: &[u64]) -> Vec<u32> {
+    words.iter().map(|&subdomain| subdomain as u32).collect()
 }
 
 /// Nodes that a pair ties together.
@@ -235,13 +232,9 @@ fn large(
     (pairs, ties): (&Pairs, &Ties),
     names: &HashMap<u64, u64>,
 ) -> HashSet<u64> {
-    let is_told = |node: u64| {
-        let at = decomposition.interface.binary_search_by_key(&node, |known| known.node);
-        at.is_ok_and(|at| decomposition.own_index(decomposition.interface[at].copies[0]).is_some())
-    };
     let mut counts: HashMap<u64, u64> = names.values().map(|&name| (name, 0)).collect();
-    let told = pairs.iter().map(|(_, pair)| pair.slave).filter(|&slave| is_told(slave));
-    let own = ties.iter().filter(|(group, _)| decomposition.own_index((group >> 32) as u32).is_some());
+    let told = pairs.iter().map(|(_, pair)| pair.slave).filter(|&slave| decomposition.tells(slave));
+    let own = ties.iter().filter(|((subdomain, _), _)| decomposition.own_index(*subdomain).is_some());
     for node in told.chain(own.map(|(_, nodes)| nodes[0])) {
         *counts.get_mut(&names[&node]).expect("it has a name") += 1;
     }
@@ -266,18 +259,16 @@ fn members(comm: &dyn Comm, mine: BTreeSet<u64>) -> HashMap<u64, Vec<usize>> {
         names.iter().for_each(|name| ranks.entry(*name).or_default().push(rank as u64));
     }
     let answer = |names: Vec<u64>| {
-        let of = |name: &u64| [&[*name, ranks[name].len() as u64][..], &ranks[name]].concat();
-        names.iter().flat_map(of).collect()
+        let mut message = Vec::new();
+        names.iter().for_each(|name| pack([*name], &ranks[name], &mut message));
+        message
     };
     let answers = comm.all_to_all(incoming.into_iter().map(answer).collect());
     let mut members = HashMap::new();
     for answer in answers {
-        let mut rest = &answer[..];
-        while let [name, count, behind @ ..] = rest {
-            let (ranks, behind) = behind.split_at(*count as usize);
-            members.insert(*name, ranks.iter().map(|&rank| rank as usize).collect());
-            rest = behind;
-        }
+        each_packed(&answer, |[name]: [u64; 1], ranks| {
+            members.insert(name, ranks.iter().map(|&rank| rank as usize).collect());
+        });
     }
     members
 }

@@ -28,14 +28,14 @@ pub fn rounds(is_uneven: bool) -> usize {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Edge {
     Slave(u64),
-    Group(u64),
+    Group(u32, u32),
 }
 
 impl Edge {
-    fn key(self) -> [u64; 2] {
+    fn key(self) -> [u64; 3] {
         match self {
-            Self::Slave(node) => [0, node],
-            Self::Group(group) => [1, group],
+            Self::Slave(node) => [0, node, 0],
+            Self::Group(subdomain, number) => [1, subdomain.into(), number.into()],
         }
     }
 }
@@ -59,7 +59,7 @@ impl Reach {
         rounds: usize,
         is_large: impl Fn(u64) -> bool,
     ) -> Self {
-        let tells = |node: &&InterfaceNode| decomposition.own_index(node.copies[0]).is_some() && is_large(node.node);
+        let tells = |node: &&InterfaceNode| is_large(node.node) && decomposition.tells(node.node);
         let told = decomposition.interface.iter().filter(tells);
         let mut nodes: BTreeMap<u64, BTreeSet<u32>> =
             told.map(|node| (node.node, node.copies.iter().copied().collect())).collect();
@@ -68,11 +68,13 @@ impl Reach {
         for (_, pair) in pairs.iter() {
             edges.entry(Edge::Slave(pair.slave)).or_default().extend(nodes_of(pair).chain([pair.slave]));
         }
-        edges.extend(ties.iter().map(|(group, of)| (Edge::Group(group), of.iter().copied().collect())));
+        edges.extend(
+            ties.iter().map(|((subdomain, number), of)| (Edge::Group(subdomain, number), of.iter().copied().collect())),
+        );
         edges.retain(|_, of| of.iter().any(|&node| is_large(node)));
         let is_told = |edge: &Edge| match *edge {
             Edge::Slave(node) => nodes.contains_key(&node),
-            Edge::Group(group) => decomposition.own_index((group >> 32) as u32).is_some(),
+            Edge::Group(subdomain, _) => decomposition.own_index(subdomain).is_some(),
         };
         let told: BTreeSet<Edge> = edges.keys().copied().filter(is_told).collect();
         let mut of_edges: BTreeMap<Edge, BTreeSet<u32>> = BTreeMap::new();
@@ -102,7 +104,7 @@ impl Reach {
         let list = |of: BTreeSet<u32>| of.into_iter().collect::<Vec<u32>>();
         let slaves = of_edges.into_iter().filter_map(|(edge, of)| match edge {
             Edge::Slave(node) => Some((node, list(of))),
-            Edge::Group(_) => None,
+            Edge::Group(..) => None,
         });
         Self { slaves: slaves.collect(), nodes: nodes.into_iter().map(|(node, of)| (node, list(of))).collect() }
     }

@@ -7,6 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::components::Components;
+use crate::comm::meeting::{each_packed, pack};
 use crate::comm::{Comm, maximum};
 use crate::decomposition::{Decomposition, Subdomain};
 use crate::mesh::Elements;
@@ -68,7 +69,7 @@ impl Ties {
                 &decomposition.interface[at].copies
             });
             let ranks: BTreeSet<usize> = copies.map(|&copy| decomposition.owner(copy)).collect();
-            ranks.into_iter().for_each(|rank| pack(*group, nodes, &mut outgoing[rank]));
+            ranks.into_iter().for_each(|rank| pack_group(*group, nodes, &mut outgoing[rank]));
         }
         let mut ties = Self { own, known, place: HashMap::new(), widest };
         ties.unpack(comm.all_to_all(outgoing));
@@ -79,18 +80,15 @@ impl Ties {
     pub fn pack(&self, first: u32, has: impl Fn(u64) -> bool, message: &mut Vec<u64>) {
         let last = first + self.own.len() as u32;
         let own = self.known.range((first, 0)..(last, 0)).filter(|(_, nodes)| nodes.iter().any(|&node| has(node)));
-        own.for_each(|(group, nodes)| pack(*group, nodes, message));
+        own.for_each(|(group, nodes)| pack_group(*group, nodes, message));
     }
 
     /// Adds groups that ranks have packed one behind the other.
     pub fn unpack(&mut self, messages: Vec<Vec<u64>>) {
         for message in messages {
-            let mut rest = &message[..];
-            while let [group, count, behind @ ..] = rest {
-                let (nodes, behind) = behind.split_at(*count as usize);
-                self.known.insert(((*group >> 32) as u32, *group as u32), nodes.to_vec());
-                rest = behind;
-            }
+            each_packed(&message, |[subdomain, number], nodes| {
+                self.known.insert((subdomain as u32, number as u32), nodes.to_vec());
+            });
         }
         self.place.clear();
         for (number, ((subdomain, _), nodes)) in (0..).zip(&self.known) {
@@ -105,9 +103,9 @@ impl Ties {
         &self.own[own]
     }
 
-    /// Each group that is known here, by its subdomain (upper half) and number, with its nodes on the interface.
-    pub fn iter(&self) -> impl Iterator<Item = (u64, &[u64])> {
-        self.known.iter().map(|(&group, nodes)| (key(group), nodes.as_slice()))
+    /// Each group that is known here, by its subdomain and its number there, with its nodes on the interface.
+    pub fn iter(&self) -> impl Iterator<Item = ((u32, u32), &[u64])> {
+        self.known.iter().map(|(&group, nodes)| (group, nodes.as_slice()))
     }
 
     /// Most nodes on the interface that a group has, on any rank; 0 if there are no groups.
@@ -121,13 +119,8 @@ impl Ties {
     }
 }
 
-fn key((subdomain, number): (u32, u32)) -> u64 {
-    u64::from(subdomain) << 32 | u64::from(number)
-}
-
-fn pack(group: (u32, u32), nodes: &[u64], message: &mut Vec<u64>) {
-    message.extend([key(group), nodes.len() as u64]);
-    message.extend(nodes);
+fn pack_group((subdomain, number): (u32, u32), nodes: &[u64], message: &mut Vec<u64>) {
+    pack([subdomain, number].map(u64::from), nodes, message);
 }
 
 /// Groups of nodes, ascending, of elements on nodes at these points.

@@ -234,9 +234,8 @@ fn holders(
     let answers =
         |node: &&InterfaceNode| !node.surfaces.is_empty() && decomposition.own_index(node.copies[0]).is_some();
     let ranks = |node: &InterfaceNode| {
-        let mut ranks: Vec<u64> = node.copies.iter().map(|&copy| decomposition.owner(copy) as u64).collect();
-        ranks.dedup();
-        ([node.node], ranks)
+        let ranks = decomposition.owners(&node.copies).into_iter().map(|rank| rank as u64);
+        ([node.node], ranks.collect())
     };
     let known = decomposition.interface.iter().filter(answers).map(ranks);
     let found = look_up(comm, known, wanted.into_iter().map(|node| [node]));

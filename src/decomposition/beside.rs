@@ -33,6 +33,13 @@ impl Decomposition {
     pub fn owner(&self, subdomain: u32) -> usize {
         self.shares.owner(subdomain as usize)
     }
+
+    /// The ranks that own some of these subdomains, which are ascending.
+    pub fn owners(&self, subdomains: &[u32]) -> Vec<usize> {
+        let mut ranks: Vec<usize> = subdomains.iter().map(|&subdomain| self.owner(subdomain)).collect();
+        ranks.dedup();
+        ranks
+    }
 }
 
 #[cfg(test)]

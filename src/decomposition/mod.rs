@@ -167,6 +167,12 @@ impl Decomposition {
         let first = self.subdomains.first()?.id;
         (subdomain as usize).checked_sub(first).filter(|&k| k < self.subdomains.len())
     }
+
+    /// Whether this rank tells others of a node on the interface: it has the lowest copy.
+    pub fn tells(&self, node: u64) -> bool {
+        let at = self.interface.binary_search_by_key(&node, |known| known.node);
+        at.is_ok_and(|at| self.own_index(self.interface[at].copies[0]).is_some())
+    }
 }
 
 /// Lays bodies one behind the other in one numbering of nodes.

@@ -149,15 +149,10 @@ fn beyond(
     lengths: &[(usize, f64)],
 ) -> Vec<(usize, f64)> {
     // A pair counts where its slave node has the lowest copy.
-    let interface = &decomposition.interface;
-    let is_first = |pair: &ContactPair| {
-        let at = interface.binary_search_by_key(&pair.slave, |node| node.node);
-        at.is_ok_and(|at| decomposition.own_index(interface[at].copies[0]).is_some())
-    };
     let (mut nodes, mut largest) = (vec![0_u64; names.len()], vec![0.0_f64; names.len()]);
     for &(number, length) in lengths {
         let pair = &pairs[number];
-        if is_first(pair) && length > LEAST * pair.area.sqrt() {
+        if decomposition.tells(pair.slave) && length > LEAST * pair.area.sqrt() {
             nodes[pair.contact] += 1;
             largest[pair.contact] = largest[pair.contact].max(length);
         }

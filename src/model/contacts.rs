@@ -95,11 +95,7 @@ pub(super) fn pair(
     all.sharing = sharing(comm, &all);
     // The rank of the lowest copy of a slave node has all its conditions.
     let interface = &decomposition.interface;
-    let is_first = |pair: &&ContactPair| {
-        let at = interface.binary_search_by_key(&pair.slave, |node| node.node);
-        at.is_ok_and(|at| decomposition.own_index(interface[at].copies[0]).is_some())
-    };
-    let own = all.pairs.iter().map(|(_, pair)| pair).filter(is_first);
+    let own = all.pairs.iter().map(|(_, pair)| pair).filter(|pair| decomposition.tells(pair.slave));
     corner::check(comm, &all.names, own, |nodes| dirichlet::fixed_here(interface, supports, nodes))?;
     Ok((all, warnings))
 }

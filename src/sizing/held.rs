@@ -2,7 +2,7 @@
 //!
 //! Of `N` ranks each holds `owned / N + everywhere + N a_rank` bytes of an item. `owned` grows with the scene and is shared.
 //! `everywhere` is on every rank: where it grows with the scene, a machine of any size ends. It does for three items: contact
-//! rows that are coupled ([`kind`]), the factors of the coarse problem, and the lists of clusters.
+//! rows that are coupled, up to a bound for each contact ([`kind`]), the factors of the coarse problem, and the lists of clusters.
 
 use super::memory::megabytes;
 use crate::constraint::links::FEW;

@@ -8,9 +8,8 @@ use std::ops::Range;
 use super::gather::Gather;
 use super::gram::{Gram, Products};
 use super::space::RowSpace;
-use crate::constraint::{Constraints, Entry};
+use crate::constraint::Constraints;
 use crate::vector::axpy;
-use crate::work;
 
 /// `B B'` of the rows of this rank.
 pub struct Coupling {
@@ -98,7 +97,7 @@ impl Coupling {
             let is_closed = |row: usize| closed[self.parts.binary_search(&row).expect("of these")];
             self.solve_parts((gather, space), slack, x, is_closed);
             let mut product = vec![0.0; x.len()];
-            self.multiply(gather, x, &mut product);
+            multiply(gather, x, &mut product);
             let left = |k: usize| slack[self.parts[k]] - product[self.parts[k]];
             let joins = join(&self.parts, &mut closed, |k| depth(self.parts[k], left(k)), deepest);
             grown = space.counts([u64::from(joins)]) != [0];
@@ -136,7 +135,7 @@ impl Coupling {
             if square <= least {
                 break;
             }
-            self.multiply(gather, &direction, &mut product);
+            multiply(gather, &direction, &mut product);
             product = only(&product);
             let step = square / space.dots(&[(&direction, &product)])[0];
             axpy(step, &direction, &mut found);
@@ -148,20 +147,13 @@ impl Coupling {
         }
         self.parts.iter().for_each(|&row| y[row] = found[row]);
     }
+}
 
-    /// `y = B B' x`, right in rows of parts; `x` is zero in others. One neighbour exchange.
-    fn multiply(&self, gather: &Gather, x: &[f64], y: &mut [f64]) {
-        let fill = |own: usize, slots: &mut [f64]| {
-            let of_parts = || gather.entries(own).iter().filter(|entry| x[entry.row as usize] != 0.0);
-            let mut moved = vec![0.0; gather.dofs(own)];
-            work::each(gather.entries(own).len(), 2, size_of::<Entry>());
-            of_parts().for_each(|entry| moved[entry.dof as usize] += entry.value * x[entry.row as usize]);
-            for entry in gather.entries(own) {
-                slots[entry.slot as usize] += entry.value * moved[entry.dof as usize];
-            }
-        };
-        gather.exchange(1, fill, |row, slots| y[row] = slots.iter().fold(0.0, |sum, slot| sum + slot));
-    }
+/// `y = B B' x`. One neighbour exchange.
+fn multiply(gather: &Gather, x: &[f64], y: &mut [f64]) {
+    let mut moved = gather.zeros();
+    gather.add_transpose(1.0, x, &mut moved);
+    gather.apply(&moved, y);
 }
 
 /// Lets rows that are too deep join those that are closed. Whether any did.

@@ -31,11 +31,6 @@ impl<'a> Gather<'a> {
         self.slots.rows()
     }
 
-    /// Local unknowns of an own subdomain.
-    pub fn dofs(&self, own: usize) -> usize {
-        self.dofs[own]
-    }
-
     /// Coefficients of an own subdomain, by row.
     pub fn entries(&self, own: usize) -> &[Entry] {
         &self.entries[own]

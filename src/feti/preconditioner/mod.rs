@@ -132,14 +132,11 @@ impl<'a> Preconditioner<'a> {
         match &self.patches {
             Some(patches) => {
                 patches.sum(self.gather, self.scaling.patches(), &self.torn, &mut self.rows);
-                self.scaling.solve(&self.rows, y);
                 patches.copy(&self.rows, y);
             }
-            None => {
-                self.gather.apply(&self.torn, &mut self.rows);
-                self.scaling.solve(&self.rows, y);
-            }
+            None => self.gather.apply(&self.torn, &mut self.rows),
         }
+        self.scaling.solve(&self.rows, y);
         if self.deluxe.is_active() {
             self.gather.apply(&self.parts, &mut self.rows);
             y.iter_mut().zip(&self.rows).for_each(|(y, part)| *y += part);

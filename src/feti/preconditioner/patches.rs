@@ -86,8 +86,9 @@ impl<'a> Patches<'a> {
 
     /// The rows of parts get `sum over s of R_s' A_s^-1 B_s x`, the others `B x`. One neighbour exchange.
     pub fn sum(&self, gather: &Gather, grams: &mut [Option<Gram>], x: &Torn, rows: &mut [f64]) {
+        let count = rows.len();
         let fill = |slots: &mut [f64]| {
-            let (mut moved, mut found) = (vec![0.0; rows.len()], vec![0.0; rows.len()]);
+            let (mut moved, mut found) = (vec![0.0; count], vec![0.0; count]);
             for (own, (patch, gram)) in self.of_own.iter().zip(grams).enumerate() {
                 for entry in gather.entries(own) {
                     let (row, value) = (entry.row as usize, entry.value * x[own][entry.dof as usize]);
@@ -105,9 +106,7 @@ impl<'a> Patches<'a> {
                 }
             }
         };
-        let mut sums = vec![0.0; rows.len()];
-        self.slots.exchange(1, fill, |row, slots| sums[row] = slots.iter().fold(0.0, |sum, slot| sum + slot));
-        rows.copy_from_slice(&sums);
+        self.slots.exchange(1, fill, |row, slots| rows[row] = slots.iter().fold(0.0, |sum, slot| sum + slot));
     }
 
     /// Takes the rows of parts from `from`.
