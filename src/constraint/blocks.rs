@@ -8,7 +8,8 @@ use super::links::{Linked, components};
 use super::prescribed::Prescribed;
 use super::reach::Reach;
 use super::ties::Ties;
-use super::{Constraints, Entry, Row, Support, Term, contact, dirichlet, friction, gluing};
+use super::{Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, friction, gluing};
+use crate::comm::{Comm, maximum};
 use crate::contact::known::Pairs;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
@@ -28,8 +29,9 @@ struct Unit {
 
 impl Constraints {
     /// All rows that touch this rank's subdomains. Supports agree (see [`dirichlet::check`]). Of parallel contact conditions that
-    /// gives the row which is the tightest at the time `at`. `friction` tells which contacts have any.
+    /// gives the row which is the tightest at the time `at`. `friction` tells which contacts have any. Collective.
     pub fn new(
+        comm: &dyn Comm,
         decomposition: &Decomposition,
         supports: &[Support],
         pairs: &Pairs,
@@ -60,6 +62,7 @@ impl Constraints {
             has_inequalities: pairs.total() > 0,
             has_friction: friction.contains(&true),
             uneven: stiffness.is_uneven(),
+            uneven_contacts: false,
             ties,
             idle: Vec::new(),
             guided: Vec::new(),
@@ -95,6 +98,11 @@ impl Constraints {
             result.push_block(rows, unit, decomposition);
         }
         result.find_sliders(pairs, directions);
+        let contacts = result.rows.iter().filter(|row| matches!(row.kind, Kind::Contact { .. }));
+        let lengths = contacts.map(|row| row.length);
+        let extremes = lengths.fold([f64::NEG_INFINITY; 2], |[most, least], l| [most.max(l), least.max(-l)]);
+        let [longest, shortest] = maximum(comm, &extremes)[..] else { unreachable!("two numbers were given") };
+        result.uneven_contacts = longest * longest > JUMP * shortest * shortest;
         result
     }
 

@@ -197,6 +197,8 @@ pub struct Constraints {
     pub has_friction: bool,
     /// Whether stiffness jumps, and rows may be of unequal length.
     pub uneven: bool,
+    /// Whether those of contacts are: what gives way there is not as soft everywhere.
+    pub uneven_contacts: bool,
     /// Nodes that short edges tie together.
     pub ties: Ties,
     /// Contact pairs of own nodes without a row, as supports fix all their nodes along the normal: index of the pair and the

@@ -1,8 +1,9 @@
 //! How two surfaces are paired, and which of them is the slave where nobody says.
 //!
 //! The slave is the surface whose nodes supports do not hold where the two face each other: held nodes carry no condition.
-//! If that does not decide, it is the finer one, on which more conditions fit: the coarser one would let the finer one's nodes
-//! enter between its own. If that does not decide either, it is the one named first.
+//! If that does not decide, it is that of a body which is much softer: what hard nodes press on soft faces between them is next to
+//! arbitrary where these are coarser. If that does not decide, it is the finer one, on which more conditions fit: the coarser one would
+//! let the finer one's nodes enter between its own. If that does not decide either, it is the one named first.
 
 use super::patch::Patch;
 use super::{Conditions, ContactError, matching, mortar, quadratic};
@@ -46,19 +47,26 @@ impl Pairing<'_> {
         }
     }
 
-    /// As [`Pairing::pair`], but chooses the slave: its index comes first. Collective.
+    /// As [`Pairing::pair`], but chooses the slave: its index comes first. The `softer` one is that of a body which is much softer than
+    /// the other one's, if there is one. Collective.
     ///
     /// # Errors
     /// As there, for either surface as the slave.
-    pub fn choose(&self, [one, other]: [&Patch; 2]) -> Result<(usize, Conditions, Rule), ContactError> {
+    pub fn choose(
+        &self,
+        [one, other]: [&Patch; 2],
+        softer: Option<usize>,
+    ) -> Result<(usize, Conditions, Rule), ContactError> {
         let first = self.pair(one, other);
         if let Ok((found, Rule::NodeToNode)) = first {
             return Ok((0, found, Rule::NodeToNode));
         }
         let second = self.pair(other, one);
-        let rank = |(found, _): &(Conditions, Rule)| (found.held > 0, usize::MAX - found.count);
+        let rank = |slave: usize, (found, _): &(Conditions, Rule)| {
+            (found.held > 0, softer.is_some_and(|softer| softer != slave), usize::MAX - found.count)
+        };
         match (first, second) {
-            (Ok(first), Ok(second)) if rank(&second) < rank(&first) => Ok((1, second.0, second.1)),
+            (Ok(first), Ok(second)) if rank(1, &second) < rank(0, &first) => Ok((1, second.0, second.1)),
             (Err(_), Ok((found, rule))) => Ok((1, found, rule)),
             (Ok((found, rule)), _) => Ok((0, found, rule)),
             (Err(error), Err(_)) => Err(error),
@@ -109,14 +117,23 @@ mod tests {
     }
 
     /// Index of the slave, number of conditions and their rule; all of the surfaces in `all_held` is held along z.
-    fn chosen([one, other]: &[GatheredSurface; 2], all_held: &[u64]) -> Option<(usize, usize, Rule)> {
+    fn chosen(surfaces: &[GatheredSurface; 2], all_held: &[u64]) -> Option<(usize, usize, Rule)> {
+        chosen_beside(surfaces, all_held, None)
+    }
+
+    /// The same where one may be of a softer body.
+    fn chosen_beside(
+        [one, other]: &[GatheredSurface; 2],
+        all_held: &[u64],
+        softer: Option<usize>,
+    ) -> Option<(usize, usize, Rule)> {
         let held = |nodes: &[u64]| {
             let all = all_held.contains(&nodes[0]);
             nodes.iter().map(|n| [false, false, all || all_held.contains(n)]).collect()
         };
         let [one, other] = [one, other].map(|surface| Patch::alone(surface.clone()));
         let pairing = Pairing { comm: &Solo, contact: 0, name: "joint", held: &held };
-        let found = pairing.choose([&one, &other]);
+        let found = pairing.choose([&one, &other], softer);
         found.ok().map(|(slave, found, rule)| (slave, found.pairs.len(), rule))
     }
 
@@ -137,12 +154,21 @@ mod tests {
     }
 
     #[test]
+    fn the_slave_is_on_the_softer_body_unless_supports_hold_it() {
+        let (fine, coarse) = ((0, 25, Rule::Mortar), (1, 16, Rule::Mortar));
+        assert_eq!(chosen_beside(&squares(4, 3), &[], Some(1)), Some(coarse));
+        assert_eq!(chosen_beside(&squares(4, 3), &[], Some(0)), Some(fine));
+        assert_eq!(chosen_beside(&squares(4, 3), &[901], Some(1)), Some(fine));
+        assert_eq!(chosen_beside(&squares(4, 3), &[104], Some(0)), Some(coarse));
+    }
+
+    #[test]
     fn another_order_of_the_two_is_the_same_contact() {
         let [fine, coarse] = squares(5, 3).map(Patch::alone);
         let free = |nodes: &[u64]| vec![[false; 3]; nodes.len()];
         let pairing = Pairing { comm: &Solo, contact: 0, name: "joint", held: &free };
-        let (slave, found, _) = pairing.choose([&fine, &coarse]).expect("they face each other");
-        let (turned, same, _) = pairing.choose([&coarse, &fine]).expect("they face each other");
+        let (slave, found, _) = pairing.choose([&fine, &coarse], None).expect("they face each other");
+        let (turned, same, _) = pairing.choose([&coarse, &fine], None).expect("they face each other");
         assert_eq!((slave, turned), (0, 1));
         assert_eq!(found, same);
     }

@@ -48,7 +48,7 @@ pub(super) fn constraints(
     let at = given.prescribed(scene, &Moved::at_end(scene, &steps[0]));
     agreed(&at)?;
     let laws: Vec<bool> = scene.contact.iter().map(|(name, contact)| contact.rubs(name, steps)).collect();
-    let constraints = Constraints::new(decomposition, supports, &contacts.pairs, linked, &at, &laws);
+    let constraints = Constraints::new(comm, decomposition, supports, &contacts.pairs, linked, &at, &laws);
     refuse_held(comm, given, &constraints.idle_distances(&at))?;
     let first = constraints.right_hand_sides(&at);
     let mut warned = Slides::default();

@@ -10,6 +10,7 @@ use crate::contact::pairing::{Pairing, Rule};
 use crate::contact::patch::Patch;
 use crate::contact::{ContactError, ContactPair, MasterNode, corner, quadratic, rigid, sagitta};
 use crate::decomposition::Decomposition;
+use crate::material::Law;
 use crate::record::counts::ContactRow;
 use crate::scene::{Contact, Scene, Sides, SurfaceName};
 
@@ -120,13 +121,25 @@ fn one(
             (0, found, rule_name(rule))
         }
         (Sides::Either(_), [(_, one), (_, other)]) => {
-            let (slave, found, rule) = pairing.choose([one, other])?;
+            let (slave, found, rule) =
+                pairing.choose([one, other], harder(scene, &surfaces).map(|(harder, _)| 1 - harder))?;
             (slave, found, rule_name(rule))
         }
         _ => unreachable!("two sides have two surfaces"),
     };
     conditions.prescribe(contact.clearance, contact.gap);
     let (mut warnings, pairs, patch) = (Vec::new(), &conditions.pairs, &surfaces[slave].1);
+    if let (Sides::Named { .. }, "mortar", Some((0, times))) = (&contact.sides, rule, harder(scene, &surfaces))
+        && contact.rubs(name, scene.steps())
+        && patch.surface.spacing() < surfaces[1].1.surface.spacing()
+    {
+        let [slave, master] = [0, 1].map(|side| surfaces[side].0);
+        warnings.push(format!(
+            "contact.{name}: its slave {slave} has the finer mesh and is {} times as stiff as {master}. With friction that takes many \
+             iterations, which may not end: exchange slave and master, or leave it to the program (surfaces)",
+            extent::short(times),
+        ));
+    }
     if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
         let found = sagitta::unresolved(comm, patch, &master.1, pairs);
         warnings.extend(found.map(|found| extent::unresolved(name, &found, conditions.count)));
@@ -155,6 +168,21 @@ fn one(
         |pair: &ContactPair| patch.surface.index(pair.slave, pair.part).is_some_and(|index| patch.surface.tells(index));
     let told = pairs.iter().map(tells).collect();
     Ok((Found { conditions, sites, told }, touching, row, warnings))
+}
+
+/// Ratio of Young's moduli from which a body is much harder than another one.
+const HARDER: f64 = 16.0;
+
+/// Which of two surfaces is that of a much harder body, and how many times as stiff as the other one it is at least.
+fn harder(scene: &Scene, surfaces: &[(&SurfaceName, Patch)]) -> Option<(usize, f64)> {
+    let young = |(surface, _): &(&SurfaceName, Patch)| {
+        let names = scene.body[&surface.body].material.names().into_iter();
+        let all = names.map(|name| scene.material[name].hooke().young);
+        all.fold([f64::INFINITY, 0.0], |[least, most], young| [f64::min(least, young), f64::max(most, young)])
+    };
+    let [one, other] = surfaces else { return None };
+    let ([low, high], [least, most]) = (young(one), young(other));
+    [low / most, least / high].into_iter().enumerate().find(|(_, times)| *times >= HARDER)
 }
 
 fn rule_name(rule: Rule) -> &'static str {

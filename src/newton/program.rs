@@ -271,7 +271,7 @@ impl Programs {
         }
         face.dual.restrict_scaling(problem.constraints, &kept);
         face.slides.adopt(&kept);
-        let (slides, uneven) = (face.slides.clone(), problem.constraints.uneven);
+        let (slides, uneven) = (face.slides.clone(), problem.constraints.uneven_contacts);
         let start = active_set::Guess { x, residual, kept, slides, uneven, astray: ASTRAY, directions };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let active_set::Solution { x: balanced, residual, slides, outcome, statistics, first_norm, directions, .. } =

@@ -21,7 +21,7 @@ mod exactness;
 
 use std::ops::ControlFlow;
 
-use self::exactness::{Exactness, LOOSE};
+use self::exactness::{Exactness, LOOSE, UNEVEN};
 use super::pcpg::{Directions, Pcpg};
 use super::quadratic::{Quadratic, Space};
 use super::slides::Slides;
@@ -85,7 +85,7 @@ pub struct Guess {
     pub kept: Vec<bool>,
     /// The discs with a guess of what they do, to which the face is restricted already.
     pub slides: Slides,
-    /// Whether rows are of unequal length, as where stiffness jumps.
+    /// Whether rows with a bound or in discs are of unequal length, as where some are stiff and some soft.
     pub uneven: bool,
     /// Where the tolerance is that of `drop`: the share of bounds that may be on the wrong set in the end.
     pub astray: f64,
@@ -151,7 +151,7 @@ impl Run<'_> {
     /// Alternates between solving and correcting the set. x starts on each set as near to `wish` as the set allows.
     fn iterate(&mut self, face: &mut dyn Face, solver: &mut Pcpg, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
         let (mut target, mut floor) = (None, 0.0);
-        let mut exactness = Exactness::new(self.names(), if self.uneven { 0.0 } else { LOOSE });
+        let mut exactness = Exactness::new(self.names(), if self.uneven { UNEVEN } else { LOOSE });
         while exactness.history.len() <= SETS && self.follows < FOLLOWS {
             self.move_to(face, &mut wish);
             self.statistics.sets += 1;
@@ -185,6 +185,9 @@ impl Run<'_> {
                 continue;
             }
             exactness.note(change.rows);
+            if exactness.is_stuck() {
+                return Outcome::Cycled;
+            }
             if self.seen(&exactness.history) {
                 if exactness.loose == 0.0 && goal <= floor {
                     return Outcome::Cycled;

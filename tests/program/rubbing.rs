@@ -257,3 +257,64 @@ fn what_overhangs_is_not_rubbed() {
         }
     }
 }
+
+/// A plate of these cells along x and y on one of others and of this stiffness, pressed and pushed askew, so that it sticks here and slips
+/// there.
+fn plates([low, high]: [usize; 2], young: f64, sides: &str) -> String {
+    let plate = |name: &str, cells: usize, z: f64| {
+        format!(
+            "[body.{name}]\nmaterial = \"{name}\"\nelement = \"hex8\"\nbrick = {{ origin = [0.0, 0.0, {z}], size = [1.0, 1.0, 0.2], \
+             cells = [{cells}, {cells}, 3] }}\n"
+        )
+    };
+    format!(
+        "material.low = {{ young = 210e3, poisson = 0.3 }}
+        material.high = {{ young = {young:?}, poisson = 0.3 }}
+        {}{}
+        [support]
+        foot = {{ surface = \"low.zmin\", fix = [\"x\", \"y\", \"z\"] }}
+        side = {{ surface = \"high.xmin\", fix = [\"x\"] }}
+        front = {{ surface = \"high.ymin\", fix = [\"y\"] }}
+        [load.top]
+        surface = \"high.zmax\"
+        traction = [1.0, 0.5, -10.0]
+        [contact.joint]
+        {sides}
+        friction = 0.3
+        [decomposition]
+        subdomains = 32
+        ",
+        plate("low", low, 0.0),
+        plate("high", high, 0.2)
+    )
+}
+
+#[test]
+fn a_plate_a_million_times_as_soft_as_its_base_rubs_in_few_iterations() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = |cells, young, sides| {
+        let summary = solve(1, &scene_file(directory.path(), &plates(cells, young, sides)), &[]).converged().summary();
+        let name = format!("{cells:?} {young} {sides}");
+        assert!(number(&summary, "residual_friction") < 1e-6, "{name}");
+        let force = vector(&summary["contact_force"]).map(f64::abs);
+        let reactions = ["side", "front"].map(|name| vector(&summary["reactions"][name]));
+        let other = std::array::from_fn(|k| (reactions[0][k] + reactions[1][k] + [1.0, 0.5, -10.0][k]).abs());
+        assert_near(&name, force, other, 1e-6);
+        assert!(force[0].hypot(force[1]) <= 0.3 * force[2], "{name}: {force:?}");
+        (number(&summary, "hessian_multiplications"), number(&summary, "energy"))
+    };
+    let [one, other] = ["slave = 'low.zmax'\nmaster = 'high.zmin'", "slave = 'high.zmin'\nmaster = 'low.zmax'"];
+    // By exact sets these took 661 and 8,000 multiplications.
+    for (young, most) in [(210.0, 400.0), (0.21, 800.0)] {
+        let ((taken, energy), turned) = (run([12, 12], young, one), run([12, 12], young, other));
+        assert!(taken.max(turned.0) <= most, "{young}: {taken} and {}", turned.0);
+        assert_close("whichever is the slave", turned.1, energy, 1e-6);
+    }
+    // The finer plate is the hard one, and so not the slave that the program chooses.
+    let (taken, energy) = run([12, 7], 0.21, "surfaces = ['low.zmax', 'high.zmin']");
+    assert!(taken <= 250.0, "{taken}");
+    assert_close("named by hand", run([12, 7], 0.21, other).1, energy, 1e-12);
+    let hard = plates([12, 7], 210.0, one) + "solver.newton_limit = 1\n";
+    let warned = solve(1, &scene_file(directory.path(), &hard), &["contact.joint.friction=2.0"]).summary();
+    assert!(warned["warnings"].to_string().contains("exchange slave and master"), "{}", warned["warnings"]);
+}

@@ -1,16 +1,19 @@
 //! How exactly an active set's equality problems are solved.
 //!
-//! A factor on the residual decides when a set is corrected. It can be too loose. Where stiffness jumps, or bodies keep their volume,
-//! the norm of the residual is that of the soft parts; the forces and gaps of stiff rows may still be wrong, and the sets may wander. So
-//! the problems are solved to the tolerance where stiffness jumps, more exactly after a correction that is much larger than an earlier
-//! one, and more exactly for good when corrections do not become smaller for long, or a set comes back, to the tolerance in the end. A
-//! set that comes back lowers the tolerance of the program too, as far as that of the scene.
+//! A factor on the residual decides when a set is corrected. It can be too loose. Where some contacts are stiff and some soft, or bodies
+//! keep their volume, the norm of the residual is that of the soft parts; the forces and gaps of stiff rows may still be wrong, and the
+//! sets may wander. So the problems are solved more exactly where contacts are that different, and after a correction that is much larger
+//! than an earlier one; and more exactly for good when corrections do not become smaller for long, or a set comes back, to the tolerance
+//! in the end. Sets that wander then wander for ever. A set that comes back lowers the tolerance of the program too, as far as that of
+//! the scene.
 //!
 //! Slips may also turn to and fro on one set, where discs are small beside the tolerance. Their springs tell: corrections of these do not
 //! become smaller.
 
 /// Factor by which the residual drops between two looks at the set.
 pub(super) const LOOSE: f64 = 0.4;
+/// The same where some contacts are stiff and some soft.
+pub(super) const UNEVEN: f64 = 0.01;
 /// What it is multiplied by for a set after a large correction, and for good where sets come back or do not settle, ...
 pub(super) const TIGHTER: f64 = 0.1;
 /// ... and the last before the tolerance.
@@ -23,6 +26,9 @@ const SETTLING: f64 = 0.7;
 const TURNS: usize = 3;
 /// So many corrections without one that is smaller than all before: sets do not settle.
 const SLOW: usize = 6;
+
+/// So many of them where problems are solved to the tolerance: sets wander.
+const STUCK: usize = 8;
 
 /// The state of it.
 pub(super) struct Exactness {
@@ -82,6 +88,11 @@ impl Exactness {
         }
     }
 
+    /// Whether sets wander, however exactly they are solved.
+    pub fn is_stuck(&self) -> bool {
+        self.loose == 0.0 && self.since >= STUCK
+    }
+
     /// More exactly for good.
     pub fn tighten(&mut self) {
         self.loose = if self.loose > LEAST { self.loose * TIGHTER } else { 0.0 };
@@ -127,8 +138,11 @@ mod tests {
         // What is as exact as can be is not tried for ever.
         for sets in 0..20 {
             assert_eq!((exactness.take_relative(), exactness.history.len()), (0.0, sets));
+            assert_eq!(exactness.is_stuck(), sets >= STUCK, "{sets}");
             exactness.note(70.0);
             exactness.history.push(vec![false]);
         }
+        exactness.note(39.0);
+        assert!(!exactness.is_stuck());
     }
 }

@@ -171,6 +171,20 @@ fn what_slides_against_its_friction_turns_round_once() {
 }
 
 #[test]
+fn what_slips_a_little_goes_on_on_a_larger_circle() {
+    let disc = Disc { normal: 2, entries: [0, 1], radius: [0.0, 0.5], flexibility: 2.0 };
+    let mut slides = Slides::open(vec![disc]);
+    slides.states = slides.next(&[0.0, 0.5, 1.0], &[0.0, 3.0, 0.0], [0.0; 2]);
+    // The unknowns are on the circle of before, 0.01 inside of the next one; the slip is 0.001 of the radius.
+    let next = slides.next(&[0.0, 0.5, 1.02], &[0.0, 0.001, 0.0], [1e-9; 2]);
+    let [Slide::Slip { radius, compliance, .. }] = next[..] else { panic!("{next:?}") };
+    assert_eq!(radius, 0.51);
+    assert!((compliance - 0.002).abs() < 1e-15, "slip over radius: {compliance}");
+    // Against its friction it sticks.
+    assert_eq!(slides.next(&[0.0, 0.5, 1.02], &[0.0, -0.001, 0.0], [1e-9; 2]), [Slide::Stick]);
+}
+
+#[test]
 fn what_swings_as_a_whole_sticks_on_the_way() {
     // All second unknowns of discs move together, far; friction alone holds them. Fixed friction would throw them to and fro.
     for seed in 0..20 {
