@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-14;
 const UNSTRAINED: f64 = 1e-12;
 
 /// A program that is not the last may leave this share of contacts on the wrong set: the next one corrects them along with its own. Not
-/// where stiffness jumps: forces of the stiff side on a wrong set are far off, and energies with them.
+/// with friction where stiffness jumps: forces of the stiff side on a wrong set are far off, and energies with them.
 const ASTRAY: f64 = 0.1;
 
 /// How to solve the programs.
@@ -273,7 +273,8 @@ impl Programs {
         face.dual.restrict_scaling(problem.constraints, &kept);
         face.slides.adopt(&kept);
         let (slides, uneven) = (face.slides.clone(), problem.constraints.uneven_contacts);
-        let astray = if problem.constraints.uneven { 0.0 } else { ASTRAY };
+        let rubs_unlike = problem.constraints.uneven && problem.constraints.has_friction;
+        let astray = if rubs_unlike { 0.0 } else { ASTRAY };
         let start = active_set::Guess { x, residual, kept, slides, uneven, astray, directions };
         let solution = active_set::solve(&space, &mut face, &bounded, start, &limits);
         let active_set::Solution { x: balanced, residual, slides, outcome, statistics, first_norm, directions, .. } =

@@ -13,7 +13,7 @@
 /// Factor by which the residual drops between two looks at the set.
 pub(super) const LOOSE: f64 = 0.4;
 /// The same where some contacts are stiff and some soft.
-pub(super) const UNEVEN: f64 = 0.01;
+pub(super) const UNEVEN: f64 = 0.001;
 /// What it is multiplied by for a set after a large correction, and for good where sets come back or do not settle, ...
 pub(super) const TIGHTER: f64 = 0.1;
 /// ... and the last before the tolerance.
