@@ -98,11 +98,7 @@ impl Constraints {
             result.push_block(rows, unit, decomposition);
         }
         result.find_sliders(pairs, directions);
-        let contacts = result.rows.iter().filter(|row| matches!(row.kind, Kind::Contact { .. }));
-        let lengths = contacts.map(|row| row.length);
-        let extremes = lengths.fold([f64::NEG_INFINITY; 2], |[most, least], l| [most.max(l), least.max(-l)]);
-        let [longest, shortest] = maximum(comm, &extremes)[..] else { unreachable!("two numbers were given") };
-        result.uneven_contacts = longest * longest > JUMP * shortest * shortest;
+        result.uneven_contacts = uneven_contacts(comm, &result.rows);
         result
     }
 
@@ -237,6 +233,14 @@ fn units<'a>(
     // The own rows of a node come before conditions.
     units.sort_by(|a, b| (&a.holders, a.key).cmp(&(&b.holders, b.key)));
     units
+}
+
+/// Whether rows of contact are of unequal length, on whatever ranks. Collective.
+fn uneven_contacts(comm: &dyn Comm, rows: &[Row]) -> bool {
+    let lengths = rows.iter().filter(|row| matches!(row.kind, Kind::Contact { .. })).map(|row| row.length);
+    let extremes = lengths.fold([f64::NEG_INFINITY; 2], |[most, least], l| [most.max(l), least.max(-l)]);
+    let [longest, shortest] = maximum(comm, &extremes)[..] else { unreachable!("two numbers were given") };
+    longest * longest > JUMP * shortest * shortest
 }
 
 /// For each own subdomain, its nodes with several copies and how many.

@@ -107,7 +107,7 @@ impl Linked {
                 node.pack(&mut nodes[rank]);
                 let of = |&copy: &u32| [u64::from(copy), self.stiffness.of(copy).to_bits()];
                 young[rank].extend(node.copies.iter().flat_map(of));
-                holders.iter().for_each(|holders| pack([node.node], &words(holders), &mut of_nodes[rank]));
+                holders.iter().for_each(|holders| pack([node.node], &words(*holders), &mut of_nodes[rank]));
             }
         }
         for (slave, holders) in &self.reach.slaves {
@@ -155,12 +155,12 @@ impl Linked {
 }
 
 /// Subdomains as words of a message.
-fn words(subdomains: &[u32]) -> Vec<u64> {
-    subdomains.iter().map(|&subdomain| u64::from(subdomain)).collect()
+pub(super) fn words<'a>(subdomains: impl IntoIterator<Item = &'a u32>) -> Vec<u64> {
+    subdomains.into_iter().map(|&subdomain| u64::from(subdomain)).collect()
 }
 
 /// Back from [`words`].
-fn subdomains(words: &[u64]) -> Vec<u32> {
+pub(super) fn subdomains(words: &[u64]) -> Vec<u32> {
     words.iter().map(|&subdomain| subdomain as u32).collect()
 }
 

@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::links::nodes_of;
+use super::links::{nodes_of, subdomains, words};
 use super::ties::Ties;
 use crate::comm::Comm;
 use crate::comm::meeting::look_up;
@@ -78,15 +78,11 @@ impl Reach {
         };
         let told: BTreeSet<Edge> = edges.keys().copied().filter(is_told).collect();
         let mut of_edges: BTreeMap<Edge, BTreeSet<u32>> = BTreeMap::new();
-        let words = |of: &BTreeSet<u32>| of.iter().map(|&s| u64::from(s)).collect::<Vec<u64>>();
         for _ in 0..rounds {
             let known = nodes.iter().map(|(node, of)| ([*node], words(of)));
             let wanted: BTreeSet<u64> = told.iter().flat_map(|edge| edges[edge].iter().copied()).collect();
             let found = look_up(comm, known, wanted.into_iter().map(|node| [node]));
-            let of = |edge: &Edge| {
-                let reached = edges[edge].iter().flat_map(|node| &found[&[*node]]);
-                (*edge, reached.map(|&s| s as u32).collect())
-            };
+            let of = |edge: &Edge| (*edge, edges[edge].iter().flat_map(|node| subdomains(&found[&[*node]])).collect());
             of_edges = told.iter().map(of).collect();
             let known = of_edges.iter().map(|(edge, of)| (edge.key(), words(of)));
             let around = |of: &BTreeSet<u64>| of.iter().any(|node| nodes.contains_key(node));
@@ -96,7 +92,7 @@ impl Reach {
                 let Some(reached) = found.get(&edge.key()) else { continue };
                 for node in of {
                     if let Some(known) = nodes.get_mut(node) {
-                        known.extend(reached.iter().map(|&s| s as u32));
+                        known.extend(subdomains(reached));
                     }
                 }
             }

@@ -47,7 +47,7 @@ impl Pairing<'_> {
         }
     }
 
-    /// As [`Pairing::pair`], but chooses the slave: its index comes first. The `softer` one is that of a body which is much softer than
+    /// As [`Pairing::pair`], but chooses the slave: its index comes first. The `harder` one is that of a body which is much stiffer than
     /// the other one's, if there is one. Collective.
     ///
     /// # Errors
@@ -55,16 +55,15 @@ impl Pairing<'_> {
     pub fn choose(
         &self,
         [one, other]: [&Patch; 2],
-        softer: Option<usize>,
+        harder: Option<usize>,
     ) -> Result<(usize, Conditions, Rule), ContactError> {
         let first = self.pair(one, other);
         if let Ok((found, Rule::NodeToNode)) = first {
             return Ok((0, found, Rule::NodeToNode));
         }
         let second = self.pair(other, one);
-        let rank = |slave: usize, (found, _): &(Conditions, Rule)| {
-            (found.held > 0, softer.is_some_and(|softer| softer != slave), usize::MAX - found.count)
-        };
+        let rank =
+            |slave, (found, _): &(Conditions, Rule)| (found.held > 0, harder == Some(slave), usize::MAX - found.count);
         match (first, second) {
             (Ok(first), Ok(second)) if rank(1, &second) < rank(0, &first) => Ok((1, second.0, second.1)),
             (Err(_), Ok((found, rule))) => Ok((1, found, rule)),
@@ -121,11 +120,11 @@ mod tests {
         chosen_beside(surfaces, all_held, None)
     }
 
-    /// The same where one may be of a softer body.
+    /// The same where one may be of a harder body.
     fn chosen_beside(
         [one, other]: &[GatheredSurface; 2],
         all_held: &[u64],
-        softer: Option<usize>,
+        harder: Option<usize>,
     ) -> Option<(usize, usize, Rule)> {
         let held = |nodes: &[u64]| {
             let all = all_held.contains(&nodes[0]);
@@ -133,7 +132,7 @@ mod tests {
         };
         let [one, other] = [one, other].map(|surface| Patch::alone(surface.clone()));
         let pairing = Pairing { comm: &Solo, contact: 0, name: "joint", held: &held };
-        let found = pairing.choose([&one, &other], softer);
+        let found = pairing.choose([&one, &other], harder);
         found.ok().map(|(slave, found, rule)| (slave, found.pairs.len(), rule))
     }
 
@@ -156,10 +155,10 @@ mod tests {
     #[test]
     fn the_slave_is_on_the_softer_body_unless_supports_hold_it() {
         let (fine, coarse) = ((0, 25, Rule::Mortar), (1, 16, Rule::Mortar));
-        assert_eq!(chosen_beside(&squares(4, 3), &[], Some(1)), Some(coarse));
-        assert_eq!(chosen_beside(&squares(4, 3), &[], Some(0)), Some(fine));
-        assert_eq!(chosen_beside(&squares(4, 3), &[901], Some(1)), Some(fine));
-        assert_eq!(chosen_beside(&squares(4, 3), &[104], Some(0)), Some(coarse));
+        assert_eq!(chosen_beside(&squares(4, 3), &[], Some(0)), Some(coarse));
+        assert_eq!(chosen_beside(&squares(4, 3), &[], Some(1)), Some(fine));
+        assert_eq!(chosen_beside(&squares(4, 3), &[901], Some(0)), Some(fine));
+        assert_eq!(chosen_beside(&squares(4, 3), &[104], Some(1)), Some(coarse));
     }
 
     #[test]

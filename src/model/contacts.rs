@@ -121,24 +121,16 @@ fn one(
             (0, found, rule_name(rule))
         }
         (Sides::Either(_), [(_, one), (_, other)]) => {
-            let (slave, found, rule) =
-                pairing.choose([one, other], harder(scene, &surfaces).map(|(harder, _)| 1 - harder))?;
+            let harder = harder(scene, &surfaces).map(|(harder, _)| harder);
+            let (slave, found, rule) = pairing.choose([one, other], harder)?;
             (slave, found, rule_name(rule))
         }
         _ => unreachable!("two sides have two surfaces"),
     };
     conditions.prescribe(contact.clearance, contact.gap);
     let (mut warnings, pairs, patch) = (Vec::new(), &conditions.pairs, &surfaces[slave].1);
-    if let (Sides::Named { .. }, "mortar", Some((0, times))) = (&contact.sides, rule, harder(scene, &surfaces))
-        && contact.rubs(name, scene.steps())
-        && patch.surface.spacing() < surfaces[1].1.surface.spacing()
-    {
-        let [slave, master] = [0, 1].map(|side| surfaces[side].0);
-        warnings.push(format!(
-            "contact.{name}: its slave {slave} has the finer mesh and is {} times as stiff as {master}. With friction that takes many \
-             iterations, which may not end: exchange slave and master, or leave it to the program (surfaces)",
-            extent::short(times),
-        ));
+    if let (Sides::Named { .. }, "mortar") = (&contact.sides, rule) {
+        warnings.extend(hard_slave(scene, (name, contact), &surfaces));
     }
     if let (Some(master), "mortar", None) = (surfaces.get(1 - slave), rule, contact.clearance) {
         let found = sagitta::unresolved(comm, patch, &master.1, pairs);
@@ -183,6 +175,20 @@ fn harder(scene: &Scene, surfaces: &[(&SurfaceName, Patch)]) -> Option<(usize, f
     let [one, other] = surfaces else { return None };
     let ([low, high], [least, most]) = (young(one), young(other));
     [low / most, least / high].into_iter().enumerate().find(|(_, times)| *times >= HARDER)
+}
+
+/// What to tell of a slave, the first surface, that is much harder and finer than its master, and is rubbed.
+fn hard_slave(scene: &Scene, (name, contact): (&str, &Contact), surfaces: &[(&SurfaceName, Patch)]) -> Option<String> {
+    let [(slave, one), (master, other)] = surfaces else { return None };
+    let (0, times) = harder(scene, surfaces)? else { return None };
+    let is_told = contact.rubs(name, scene.steps()) && one.surface.spacing() < other.surface.spacing();
+    is_told.then(|| {
+        format!(
+            "contact.{name}: its slave {slave} has the finer mesh and is {} times as stiff as {master}. With friction that takes many \
+             iterations, which may not end: exchange slave and master, or leave it to the program (surfaces)",
+            extent::short(times),
+        )
+    })
 }
 
 fn rule_name(rule: Rule) -> &'static str {

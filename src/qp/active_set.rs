@@ -21,7 +21,7 @@ mod exactness;
 
 use std::ops::ControlFlow;
 
-use self::exactness::{Exactness, LOOSE, UNEVEN};
+use self::exactness::{Exactness, LEAST, LOOSE};
 use super::pcpg::{Directions, Pcpg};
 use super::quadratic::{Quadratic, Space};
 use super::slides::Slides;
@@ -151,7 +151,7 @@ impl Run<'_> {
     /// Alternates between solving and correcting the set. x starts on each set as near to `wish` as the set allows.
     fn iterate(&mut self, face: &mut dyn Face, solver: &mut Pcpg, mut wish: Vec<f64>, limits: &Limits) -> Outcome {
         let (mut target, mut floor) = (None, 0.0);
-        let mut exactness = Exactness::new(self.names(), if self.uneven { UNEVEN } else { LOOSE });
+        let mut exactness = Exactness::new(self.names(), if self.uneven { LEAST } else { LOOSE });
         while exactness.history.len() <= SETS && self.follows < FOLLOWS {
             self.move_to(face, &mut wish);
             self.statistics.sets += 1;

@@ -9,8 +9,8 @@
 //!
 //! Newton's method for the second one, with `d = z / |z|`, fixes the unknown along `d` at `r`, and leaves the one across, `y`, to a
 //! spring: `v across d = c y` with the compliance `c = f (|z| / r - 1)`. Each set is a symmetric linear problem. The radius is a
-//! constant, or grows with another unknown `x_n`; it is that of the set before, so that with the sets radii converge, too. Whether what
-//! slips goes on is told by that radius: slips are often so small that the change of a radius would hide them. Where nothing presses (`r = 0`) the disc is a point.
+//! constant, or grows with another unknown `x_n`; it is that of the set before, so that with the sets radii converge, too. That one
+//! tells whether a slip goes on: the change of a radius would hide small slips. Where nothing presses (`r = 0`) the disc is a point.
 
 use super::discs;
 
@@ -117,8 +117,8 @@ impl Disc {
         let ([a, b], [s, t]) = (self.of(x), self.of(v));
         let z = [a + s / self.flexibility, b + t / self.flexibility];
         let size = z[0].hypot(z[1]);
-        // What slips was put on a circle: it has not come off it because the next one is larger.
-        let border = if let Slide::Slip { radius, .. } = state { radius } else { radius };
+        // What slips was put on the circle of before: it has not come off it because the next one is larger.
+        let border = if let Slide::Slip { radius: before, .. } = state { before } else { radius };
         let margin = tolerance / self.flexibility;
         let outside = size > border * (1.0 + ROUNDING) + margin;
         let slips = match state {

@@ -12,12 +12,10 @@
 
 /// Factor by which the residual drops between two looks at the set.
 pub(super) const LOOSE: f64 = 0.4;
-/// The same where some contacts are stiff and some soft.
-pub(super) const UNEVEN: f64 = 0.001;
 /// What it is multiplied by for a set after a large correction, and for good where sets come back or do not settle, ...
 pub(super) const TIGHTER: f64 = 0.1;
-/// ... and the last before the tolerance.
-const LEAST: f64 = 1e-3;
+/// ... and the last before the tolerance; the first where some contacts are stiff and some soft.
+pub(super) const LEAST: f64 = 1e-3;
 /// A correction that changes this many times more rows than the smallest so far: sets are corrected too early.
 const GROWTH: f64 = 1.3;
 /// A correction of springs that is not below this share of the last one: springs do not settle.
