@@ -290,23 +290,47 @@ def by_counts(runs):
 
 
 def growth(points):
-    """`a + b ln S` through the points, of least squares; `b` is not below zero."""
-    xs, ys = zip(*[(math.log(s), y) for s, y in points])
+    """`a` and `b` of applications a step, `a / (1 + b S^(-1/3))`, by least squares of their inverses; `b` is not below zero.
+
+    FETI's condition number is bounded for any number S of subdomains (Farhat, Mandel and Roux 1994). Fewer of them have fewer
+    iterations, as more are at the outside of the bodies, with fewer neighbours: a share of about S^(-1/3).
+    """
+    xs, ys = zip(*[(s ** (-1 / 3), 1 / y) for s, y in points])
     slope, value = statistics.linear_regression(xs, ys)
-    return [value, slope] if slope > 0 else [statistics.mean(ys), 0.0]
+    return [1 / value, slope / value] if slope > 0 < value else [1 / statistics.mean(ys), 0.0]
+
+
+def logarithm(points):
+    """`a + b ln S` likewise, which has no bound: to compare with."""
+    slope, value = statistics.linear_regression([math.log(s) for s, _ in points], [y for _, y in points])
+    return [value, slope]
+
+
+def applications_of(steps, law, subdomains):
+    return steps * law[0] / (1 + law[1] * max(subdomains, 1) ** (-1 / 3))
 
 
 def counts_of(runs):
-    """Newton steps and applications of the first level of a cascade, of those between, and of the last."""
-    points = [[], [], []]
+    """Newton steps, and growth of applications a step, of the first level of a cascade, of those between, and of the last."""
+    points = points_of(runs)
+    steps = [statistics.median(steps for _, steps, _ in of_place) for of_place in points]
+    return steps, [growth(a_step(of_place)) for of_place in points]
+
+
+def a_step(points):
+    return [(subdomains, applications / steps) for subdomains, steps, applications in points]
+
+
+def points_of(runs):
+    """Subdomains, Newton steps and applications by the place of a level in its cascade. They are the same on any ranks."""
+    points = [set(), set(), set()]
     for run in runs:
         summary = run.group.first
         coarser = summary["cascade"]
         for number, level in enumerate([*coarser, summary] if coarser else []):
             place = place_of(number, len(coarser) + 1)
-            points[place].append((level["subdomains"], level["newton_iterations"], level["hessian_multiplications"]))
-    steps = [statistics.median(p[1] for p in of_place) for of_place in points]
-    return steps, [growth([(p[0], p[2]) for p in of_place]) for of_place in points]
+            points[place].add((level["subdomains"], level["newton_iterations"], level["hessian_multiplications"]))
+    return points
 
 
 def place_of(number, levels):
@@ -334,8 +358,7 @@ def forecast(record, units, steps, applications):
     levels = record["summary"]["forecast"]["levels"]
     for number, level in enumerate(levels):
         place = place_of(number, len(levels))
-        a, b = applications[place]
-        count = a + b * math.log(max(level["subdomains"], 1))
+        count = applications_of(steps[place], applications[place], level["subdomains"])
         times = {"run": 1, "step": steps[place], "application": count}
         for amount in level["amounts"]:
             seconds = times[amount["per"]] * amount["amount"] * units.get((amount["of"], amount["per"]), 0.0)
@@ -351,7 +374,8 @@ Written by `scripts/bench write model` from the runs in [raw/model](raw/model), 
 the counts in [raw/study](raw/study). `fetiplast check --ranks N` counts the [amounts of work](../src/sizing/forecast.rs) of a run;
 here the seconds of their units are fitted to measured runs, and written to [model.json](model.json), by which it forecasts. It tells
 what cannot be measured here, with the caution that asks for: units are those of this machine, networks are assumed, and applications
-of F grow as a + b ln S through the measured ones. Input and output of files, and imbalance of plastic elements, are not in it.
+of F grow with the subdomains to a bound, as measured ones do. Input and output of files, and imbalance of plastic elements, are
+not in it.
 """
 
 
@@ -370,7 +394,7 @@ def pages(folder=RESULTS, raw=RAW, counted=study.RAW):
         return {}
     units, (steps, applications) = calibrated(runs), counts_of(runs + held)
     good = in_network(units, NETWORKS["good"])
-    text = [HEAD, *of_units(good, steps, applications), *of_runs(runs, held, units), *of_counts(counted)]
+    text = [HEAD, *of_units(good, steps, applications), *of_runs(runs, held, units), *of_growth(runs, held), *of_counts(counted)]
     text += [*of_weak(asked, units, steps, applications), *of_strong(asked, units, steps, applications)]
     text += [*of_machines(asked, good, steps, applications), "## Where the runs come from\n"]
     text.append(circumstances([r for r in records if r["kind"] == "time"]))
@@ -400,8 +424,9 @@ def of_units(units, steps, applications):
     yield f"Messages are those of an assumed network ({network}; in seconds and bytes a second).\n"
     lines = []
     for name, n, (a, b) in zip(("first of a cascade", "between", "last"), steps, applications):
-        lines.append([name, f"{n:.0f}", f"{a:.0f} + {b:.1f} ln S"])
-    yield table(["level", "Newton steps", "applications of F"], lines)
+        lines.append([name, f"{n:g}", f"{a:.1f} / (1 + {b:.2f} S^(-1/3))"])
+    yield "Applications of F a Newton step, of S subdomains:\n"
+    yield table(["level", "Newton steps", "applications a step"], lines)
 
 
 def of_runs(runs, held, units):
@@ -429,6 +454,29 @@ def of_runs(runs, held, units):
     if errors:
         most = [100 * max(of) for of in zip(*errors)]
         yield f"Largest error of a run held back: {most[0]:.0f} % by counts, {most[1]:.0f} % by the scene.\n"
+
+
+def of_growth(runs, held):
+    """The last level's applications by the other runs, with the bound and without."""
+    yield "## Applications of F, held back\n"
+    yield (
+        "Of the last Newton steps of a cascade, by the runs that are not held back: a / (1 + b S^(-1/3)), which has a bound as "
+        "FETI's condition number has, and a + b ln S.\n"
+    )
+    known, laws, rows, squares = a_step(points_of(runs)[2]), (growth, logarithm), [], ([], [])
+    values = (lambda law, s: applications_of(1, law, s), lambda law, s: law[0] + law[1] * math.log(s))
+    for subdomains, counted in sorted(a_step(points_of([*runs, *held])[2])):
+        row = [thousands(subdomains), f"{counted:.1f}"]
+        for law, value, of_law in zip(laws, values, squares):
+            predicted = value(law(known), subdomains)
+            row.append(f"{predicted:.1f} ({100 * (predicted / counted - 1):+.0f} %)")
+            if (subdomains, counted) not in known:
+                of_law.append((predicted / counted - 1) ** 2)
+        rows.append([*row, "" if (subdomains, counted) in known else "held back"])
+    yield table(["subdomains", "applications a step", "with a bound", "without", ""], rows)
+    if squares[0]:
+        bound, none = (100 * math.sqrt(statistics.mean(of_law)) for of_law in squares)
+        yield f"Of those held back {bound:.0f} % off with a bound, and {none:.0f} % without (root of the mean square).\n"
 
 
 def of_counts(raw):

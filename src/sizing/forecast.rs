@@ -14,8 +14,9 @@
 //! | `collectives`, `bytes` | steps of trees of all ranks; bytes sent or received |
 //!
 //! Units come from runs of this machine and networks from outside: `bench-results/model.json`, which `scripts/bench write model` makes
-//! of measured runs. Counts of steps and applications grow with the logarithm of the subdomains there. A cascade is the sum of its
-//! levels. What is not in it: input and output of large files, waiting for ranks with more plastic elements, other programs.
+//! of measured runs. Applications of a step grow with the subdomains to a bound there, as FETI's condition number has one. A cascade
+//! is the sum of its levels. What is not in it: input and output of large files, waiting for ranks with more plastic elements, other
+//! programs.
 
 use std::sync::LazyLock;
 
@@ -33,7 +34,7 @@ struct Model {
     sizes: Vec<OfSize>,
     /// Newton steps of the first level of a cascade, of those between, and of the last or only one.
     steps: [f64; 3],
-    /// Applications likewise: those of one subdomain, and how many more for `ln` of the subdomains.
+    /// Applications a step likewise: `[a, b]` of `a / (1 + b S^(-1/3))` for `S` subdomains.
     applications: [[f64; 2]; 3],
 }
 
@@ -113,8 +114,8 @@ pub fn forecast((sizes, bodies): (&Sizes, usize), memory: &Memory, ranks: usize,
 /// Of a level with this part of the subdomains.
 fn of_level(sizes: &Sizes, factors: [f64; 2], ranks: usize, part: f64, place: usize) -> OfLevel {
     let subdomains = part * sizes.subdomains as f64;
-    let [few, more] = MODEL.applications[place];
-    let (steps, applications) = (MODEL.steps[place], few + more * subdomains.max(1.0).ln());
+    let (steps, [bound, fewer]) = (MODEL.steps[place], MODEL.applications[place]);
+    let applications = steps * bound / (1.0 + fewer / subdomains.max(1.0).cbrt());
     let amounts = amounts(sizes, factors, ranks as f64, part);
     let mut level = OfLevel { subdomains, steps, applications, amounts, seconds: 0.0 };
     level.seconds = seconds(&level, sizes.primal_dofs as f64 / sizes.subdomains as f64, |_| true);

@@ -73,9 +73,11 @@ def test_units_are_straight_in_logarithms_between_sizes_and_constant_beyond():
     assert values == pytest.approx([1.0, 1.0, 2.0, 3.0, 3.0])
 
 
-def test_counts_grow_with_the_logarithm_or_not_at_all():
-    assert model.growth([(1, 50.0), (100, 50.0 + 3 * model.math.log(100))]) == pytest.approx([50.0, 3.0])
-    assert model.growth([(1, 60.0), (100, 40.0)]) == [50.0, 0.0]
+def test_counts_grow_to_a_bound_or_not_at_all():
+    points = [(s, 16.0 / (1 + 2 * s ** (-1 / 3))) for s in (8, 1000, 64)]
+    assert model.growth(points) == pytest.approx([16.0, 2.0])
+    assert model.applications_of(5, [16.0, 2.0], 8) == close(5 * 8.0)
+    assert model.growth([(1, 60.0), (8, 40.0)]) == [close(48.0), 0.0]
 
 
 def test_levels_of_a_cascade_are_the_first_those_between_and_the_last():
@@ -88,8 +90,8 @@ def test_a_record_is_forecast_from_its_amounts():
     levels = [{"subdomains": 1, "amounts": amounts}, {"subdomains": 8, "amounts": [*amounts, {"of": "bytes", "per": "run", "amount": 3.0}]}]
     record = {"summary": {"primal_dofs": 80, "subdomains": 8, "forecast": {"levels": levels}}}
     units = {10: {("rows", "run"): 1.0, ("rows", "step"): 0.1, ("rows", "application"): 0.01, ("bytes", "run"): 5.0}}
-    steps, applications = [2, 3, 4], [[10, 0], [0, 0], [20, 7]]
-    last = 20 + 7 * model.math.log(8)
+    steps, applications = [2, 3, 4], [[5, 0], [1, 0], [10, 2]]
+    last = 4 * 10 / (1 + 2 / 2)
     total, messages, count = model.forecast(record, units, steps, applications)
     assert (messages, count) == (15.0, close(last))
     assert total == close(2 * (1 + 0.2 + 0.1) + 2 * (1 + 0.4 + 0.01 * last) + 15)
