@@ -14,6 +14,10 @@ use crate::material::Law;
 use crate::monitor::timing::Timer;
 use crate::scene::{ErrorOf, Preconditioner, Qp, Scene};
 
+/// Coarser levels at most. Each of them costs a rank at least a subdomain, where ranks have few of the last level. A third one would
+/// save the first of them about as much.
+const COARSER: usize = 2;
+
 /// Arguments of `solve`.
 #[derive(Debug, Args)]
 pub struct Solve {
@@ -44,7 +48,7 @@ pub struct Solve {
     /// Find the limit load, to 1 % or so near: 0.01 or 1%. Short for --set limit.tolerance=...
     #[arg(long, value_name = "X", value_parser = values::error, num_args = 0..=1, default_missing_value = "1%", require_equals = true)]
     limit: Option<String>,
-    /// Solve half the level first, and so on, and start from there: auto (where it pays), on or off.
+    /// Solve a quarter of the level first, then half of it, and start from there: auto (where it pays), on or off.
     #[arg(long, value_name = "WHEN", default_value = "auto", num_args = 0..=1, default_missing_value = "on")]
     cascade: Cascade,
     #[command(flatten)]
@@ -74,7 +78,7 @@ impl Cascade {
             return Vec::new();
         }
         let half = |l: &usize| (*l > 1).then(|| l.div_ceil(2));
-        let mut levels: Vec<usize> = std::iter::successors(half(&level), half).collect();
+        let mut levels: Vec<usize> = std::iter::successors(half(&level), half).take(COARSER).collect();
         levels.reverse();
         levels
     }
@@ -102,4 +106,17 @@ pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32,
     levels.push(source.level);
     let plan = Plan { source, levels, yielding: None, rows: Vec::new(), refinements: Vec::new() };
     carry_out(plan, &found, &scene, None, Setting { timer, out, conduct, signals }, comm)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::two_bricks;
+
+    #[test]
+    fn a_cascade_has_two_coarser_levels_at_most() {
+        let scene = two_bricks(&[]);
+        let before = |level| Cascade::On.before(level, &scene);
+        assert_eq!([1, 2, 3, 5, 10].map(before), [vec![], vec![1], vec![1, 2], vec![2, 3], vec![3, 5]]);
+    }
 }
