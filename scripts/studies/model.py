@@ -179,7 +179,14 @@ def used(raw=RAW):
     for record in times:
         groups.setdefault((record["level"], record["cells"], record["ranks"]), []).append(record)
     timed = [record for records in groups.values() for record in Group(records).records]
-    asked = [r for r in records if r["kind"] == "forecast"]
+    # Amounts of a run are those of as many levels as it had.
+    had = {(r["level"], r["cells"], r["ranks"]): len(r["summary"]["cascade"]) + 1 for r in timed}
+
+    def fits(record):
+        levels = len(record["summary"]["forecast"]["levels"])
+        return record["of"] != "time" or levels == had.get((record["level"], record["cells"], record["ranks"]))
+
+    asked = [r for r in records if r["kind"] == "forecast" and fits(r)]
     return timed + newest(asked, ("of", "level", "cells", "ranks", "cluster", "nodes"))
 
 
