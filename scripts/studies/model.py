@@ -134,8 +134,8 @@ def cut(cells, cluster=None):
 
 
 def scene(boxes, cells, cluster):
-    """The benchmark with about so many boxes of so many cells along the axes of each body, at the level from which a cascade begins
-    with a few subdomains. Cells of a scene are those of its level 1."""
+    """The benchmark with about so many boxes of so many cells along the axes of each body, at the highest level that divides
+    them, so that there are coarser ones. Cells of a scene are those of its level 1."""
     fits = (level for level in (10, 5, 2) if min(boxes[1:]) >= level and all(cells * n % level == 0 for n in boxes))
     level = next(fits, 1)
     counts = [cells * n // level for n in boxes]
@@ -307,13 +307,8 @@ def growth(points):
     return [1 / value, slope / value] if slope > 0 < value else [1 / statistics.mean(ys), 0.0]
 
 
-def logarithm(points):
-    """`a + b ln S` likewise, which has no bound: to compare with."""
-    slope, value = statistics.linear_regression([math.log(s) for s, _ in points], [y for _, y in points])
-    return [value, slope]
-
-
 def applications_of(steps, law, subdomains):
+    """In so many steps, by the law that `growth` found."""
     return steps * law[0] / (1 + law[1] * max(subdomains, 1) ** (-1 / 3))
 
 
@@ -464,26 +459,29 @@ def of_runs(runs, held, units):
 
 
 def of_growth(runs, held):
-    """The last level's applications by the other runs, with the bound and without."""
+    """The last level's applications by the runs that are not held back, with the bound and without."""
+    known = set(a_step(points_of(runs)[2]))
+    beyond = set(a_step(points_of(held)[2])) - known
+    bound, line = growth(known), statistics.linear_regression([math.log(s) for s, _ in known], [y for _, y in known])
+
+    def errors(subdomains, counted):
+        predicted = (applications_of(1, bound, subdomains), line.intercept + line.slope * math.log(subdomains))
+        return [(p, p / counted - 1) for p in predicted]
+
     yield "## Applications of F, held back\n"
     yield (
-        "Of the last Newton steps of a cascade, by the runs that are not held back: a / (1 + b S^(-1/3)), which has a bound as "
-        "FETI's condition number has, and a + b ln S.\n"
+        "Of a Newton step on the last level of a cascade, by the runs that are not held back: a / (1 + b S^(-1/3)), which has a bound "
+        "as FETI's condition number has, and a + b ln S.\n"
     )
-    known, laws, rows, squares = a_step(points_of(runs)[2]), (growth, logarithm), [], ([], [])
-    values = (lambda law, s: applications_of(1, law, s), lambda law, s: law[0] + law[1] * math.log(s))
-    for subdomains, counted in sorted(a_step(points_of([*runs, *held])[2])):
-        row = [thousands(subdomains), f"{counted:.1f}"]
-        for law, value, of_law in zip(laws, values, squares):
-            predicted = value(law(known), subdomains)
-            row.append(f"{predicted:.1f} ({100 * (predicted / counted - 1):+.0f} %)")
-            if (subdomains, counted) not in known:
-                of_law.append((predicted / counted - 1) ** 2)
-        rows.append([*row, "" if (subdomains, counted) in known else "held back"])
+    rows = []
+    for point in sorted(known | beyond):
+        found = [f"{predicted:.1f} ({100 * error:+.0f} %)" for predicted, error in errors(*point)]
+        rows.append([thousands(point[0]), f"{point[1]:.1f}", *found, "held back" if point in beyond else ""])
     yield table(["subdomains", "applications a step", "with a bound", "without", ""], rows)
-    if squares[0]:
-        bound, none = (100 * math.sqrt(statistics.mean(of_law)) for of_law in squares)
-        yield f"Of those held back {bound:.0f} % off with a bound, and {none:.0f} % without (root of the mean square).\n"
+    if beyond:
+        of_laws = zip(*([error for _, error in errors(*point)] for point in beyond))
+        means = [100 * math.sqrt(statistics.mean(e**2 for e in of_law)) for of_law in of_laws]
+        yield f"Of those held back {means[0]:.0f} % off with a bound, and {means[1]:.0f} % without (root of the mean square).\n"
 
 
 def of_counts(raw):

@@ -14,8 +14,8 @@ use crate::material::Law;
 use crate::monitor::timing::Timer;
 use crate::scene::{ErrorOf, Preconditioner, Qp, Scene};
 
-/// Coarser levels at most. Each of them costs a rank at least a subdomain, where ranks have few of the last level. A third one would
-/// save the first of them about as much.
+/// Coarser levels at most. Where a rank has few subdomains of the last level, each of them costs it about one of those: a third would cost
+/// what it saves.
 const COARSER: usize = 2;
 
 /// Arguments of `solve`.
