@@ -106,6 +106,13 @@ pub fn maximum(comm: &dyn Comm, mine: &[f64]) -> Vec<f64> {
     all.into_iter().map(|bits| f64::from_bits(turned(bits).cast_unsigned())).collect()
 }
 
+/// The least and the largest of all ranks' values; of none, the infinities the wrong way round. Collective.
+pub fn range(comm: &dyn Comm, mine: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let ends = mine.into_iter().fold([f64::NEG_INFINITY; 2], |[least, most], x| [least.max(-x), most.max(x)]);
+    let ends = maximum(comm, &ends);
+    [-ends[0], ends[1]]
+}
+
 /// Some numbers of the rank whose `value` is largest, of the lowest one among equals; NaN is no value. Collective.
 pub fn of_largest<const N: usize>(comm: &dyn Comm, value: f64, numbers: [f64; N]) -> [f64; N] {
     let value = if value.is_nan() { f64::NEG_INFINITY } else { value };

@@ -161,7 +161,7 @@ impl Comm for Thread {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::{all_gather_text, decide, from_root, maximum, of_largest, sums};
+    use crate::comm::{all_gather_text, decide, from_root, maximum, of_largest, range, sums};
 
     #[test]
     fn collectives_deliver_in_rank_order() {
@@ -176,6 +176,10 @@ mod tests {
                 let fault = maximum(comm, &[if comm.rank() == 0 { -f64::NAN } else { f64::INFINITY }]);
                 assert!(fault[0].is_nan());
                 assert_eq!(maximum(comm, &[f64::NEG_INFINITY]), [f64::NEG_INFINITY]);
+                // The lowest rank has none.
+                let ends = range(comm, (0..comm.rank()).map(|r| r as f64 - 1.0));
+                let expected = if size > 1 { [-1.0, size as f64 - 3.0] } else { [f64::INFINITY, f64::NEG_INFINITY] };
+                assert_eq!(ends, expected);
                 assert_eq!(
                     of_largest(comm, (rank - 1.0).abs(), [rank, f64::NAN])[0],
                     if size > 3 { size as f64 - 1.0 } else { 0.0 }

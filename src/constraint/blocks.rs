@@ -9,7 +9,7 @@ use super::prescribed::Prescribed;
 use super::reach::Reach;
 use super::ties::Ties;
 use super::{Constraints, Entry, JUMP, Row, Support, Term, contact, dirichlet, friction, gluing};
-use crate::comm::{Comm, maximum};
+use crate::comm::{Comm, range};
 use crate::contact::known::Pairs;
 use crate::decomposition::{Decomposition, InterfaceNode};
 
@@ -238,8 +238,7 @@ fn units<'a>(
 /// Whether rows of contact are of unequal length, on whatever ranks. Collective.
 fn uneven_contacts(comm: &dyn Comm, rows: &[Row]) -> bool {
     let lengths = rows.iter().filter(|row| matches!(row.kind, Kind::Contact { .. })).map(|row| row.length);
-    let extremes = lengths.fold([f64::NEG_INFINITY; 2], |[most, least], l| [most.max(l), least.max(-l)]);
-    let [longest, shortest] = maximum(comm, &extremes)[..] else { unreachable!("two numbers were given") };
+    let [shortest, longest] = range(comm, lengths);
     longest * longest > JUMP * shortest * shortest
 }
 

@@ -12,7 +12,7 @@ use super::components::Components;
 use super::reach::{Reach, rounds};
 use super::ties::Ties;
 use crate::comm::meeting::{ask, each_packed, home, look_up, pack};
-use crate::comm::{Comm, maximum, sums};
+use crate::comm::{Comm, range, sums};
 use crate::contact::ContactPair;
 use crate::contact::known::Pairs;
 use crate::decomposition::{Decomposition, InterfaceNode};
@@ -60,13 +60,13 @@ impl Linked {
     /// From the conditions of own nodes, to which the others of the same blocks are added, and the stiffness of own subdomains
     /// (Young's modulus). Collective.
     pub fn new(comm: &dyn Comm, decomposition: &Decomposition, pairs: &mut Pairs, young: &[f64]) -> Self {
-        let extreme = |sign: f64| sign * maximum(comm, &[young.iter().fold(-f64::INFINITY, |m, y| m.max(sign * y))])[0];
+        let [least, largest] = range(comm, young.iter().copied());
         let bits: Vec<u64> = young.iter().map(|young| young.to_bits()).collect();
         let known = decomposition.of_neighbours(comm, &bits).into_iter();
         let stiffness = Stiffness {
             known: known.map(|(subdomain, bits)| (subdomain, f64::from_bits(bits))).collect(),
-            largest: extreme(1.0),
-            least: extreme(-1.0),
+            largest,
+            least,
         };
         let ties = Ties::new(comm, decomposition);
         let names = names(comm, pairs, &ties);
