@@ -187,9 +187,9 @@ fn a_large_contact_in_parts_passes_a_uniform_pressure() {
         subdomains = 60
         "#,
     );
-    for young in [210000.0, 210.0] {
+    for (young, ranks) in [(210000.0, &[2][..]), (210.0, &[1, 2, 5])] {
         let sets = [&format!("material.other.young={young:?}"), "solver.qp_tolerance=1e-10"];
-        let summary = Value::Object(assert_independent_of_ranks(&file, &sets, &[1, 2, 5]));
+        let summary = Value::Object(assert_independent_of_ranks(&file, &sets, ranks));
         let conditions = summary["contacts"][0]["conditions"].as_u64();
         assert_eq!(conditions, Some(35 * 35), "{}", summary["contacts"]);
         let energy = -0.5 * 100.0_f64.powi(2) * 34.0 * 34.0 * (2.0 / 210_000.0 + 3.0 / young);
