@@ -13,7 +13,7 @@
 //! d zeta = (alpha - f_1'(u + du)) / f_1'v,   du + d zeta v
 //! ```
 //!
-//! The second part takes the contacts as the first left them; the next step corrects them.
+//! The second part takes the contacts as the first left them; the next step corrects them. Where bodies flow `v` is a mechanism.
 
 use std::mem::take;
 
@@ -47,6 +47,15 @@ pub struct Reach {
     pub factor: f64,
     /// How often `alpha` was chosen.
     pub number: usize,
+    /// What the response of the last step's tangents is as a mechanism: an upper bound of the limit factor.
+    pub upper: Option<f64>,
+}
+
+impl Reach {
+    /// Where loads of this factor do this work, if one is known.
+    pub fn at(work: Option<f64>, factor: f64) -> Self {
+        Self { work, factor, number: 1, upper: None }
+    }
 }
 
 /// The loads, and where they are.
@@ -65,7 +74,7 @@ impl Control {
     pub fn new(loads: &Torn, along: Torn, before: Option<Reach>) -> Self {
         let mut permanent = loads.clone();
         add(-1.0, &along, &mut permanent);
-        Self { permanent, along, reach: before.unwrap_or(Reach { work: None, factor: 1.0, number: 1 }) }
+        Self { permanent, along, reach: before.unwrap_or(Reach::at(None, 1.0)) }
     }
 
     /// `f_0 + zeta f_1`.
@@ -87,10 +96,16 @@ impl Control {
         problem.space.sum((0..self.along.len()).map(of).collect::<Vec<_>>().as_flattened(), N)
     }
 
-    /// `f_0'v`. One collective.
-    pub fn permanent_work(&self, problem: &TornProblem, v: &Torn) -> f64 {
-        let of = |own: usize| dot(&self.permanent[own], &v[own]);
-        problem.space.sum(&(0..v.len()).map(of).collect::<Vec<_>>(), 1)[0]
+    /// The upper bound of the limit factor by a mechanism ([`super::limit`]), with the stress at `u`; `None` if loads do no work on it.
+    /// Collective.
+    pub fn upper(&self, problem: &TornProblem, u: &Torn, mut mechanism: Torn) -> Option<f64> {
+        let v = &mut mechanism;
+        problem.make_admissible_velocity(v);
+        let along = self.works(problem, [v])[0];
+        let of =
+            |own: usize| dissipation::most(&problem.region(own), &u[own], &v[own]) - dot(&self.permanent[own], &v[own]);
+        let taken = problem.space.sum(&(0..v.len()).map(of).collect::<Vec<_>>(), 1)[0];
+        Some(taken / along).filter(|upper| along > 0.0 && upper.is_finite())
     }
 
     /// Changes `zeta`, with the loads of the problem and the energies at a displacement that does the work `before`.
@@ -134,6 +149,7 @@ impl Control {
             return Err(Outcome::Idle);
         }
         let change = (work - before - added) / compliance;
+        self.reach.upper = self.upper(problem, u, v.clone());
         add(change, &v, &mut step.du);
         step.lambda.iter_mut().zip(&lambda).for_each(|(l, of_v)| *l += change * of_v);
         problem.laws().project(&mut step.lambda);
@@ -141,12 +157,6 @@ impl Control {
         step.is_exact = false;
         Ok(())
     }
-}
-
-/// The most power that a mechanism takes, see [`dissipation::most`], with the stress at `u`. One collective.
-pub fn most(problem: &TornProblem, u: &Torn, v: &Torn) -> f64 {
-    let of = |own: usize| dissipation::most(&problem.region(own), &u[own], &v[own]);
-    problem.space.sum(&(0..u.len()).map(of).collect::<Vec<_>>(), 1)[0]
 }
 
 /// A factor of loads with the elastic response `v`: where stresses are their limit on average, those that do more work count more. Not

@@ -1,16 +1,17 @@
 //! The limit load factor between two bounds, by loads that follow the work they do ([`super::control`]).
 //!
 //! Each equilibrium without hardening is a stress within the yield surface: its `zeta` is a lower bound of the limit of the mesh. What
-//! bodies moved by since the equilibrium before is a mechanism `v`, and
+//! bodies moved by since the equilibrium before is a mechanism `v`, and so is the response of their tangents to the loads. Each has
 //!
 //! ```text
-//! (most power that stresses have on v  -  f_0'v) / f_1'v
+//! (most power that stresses have on v  -  f_0'v) / f_1'v,
 //! ```
 //!
-//! is an upper bound where `v` keeps volumes; what is left of their change, which falls as the flow spreads, counts with the pressure
-//! that is there ([`crate::assembly::dissipation`]). Both are bounds of the limit of the mesh; that of conforming meshes is above the exact one.
+//! an upper bound where `v` keeps volumes; what is left of their change, which falls as the flow spreads, counts with the pressure
+//! that is there ([`crate::assembly::dissipation`]). The least one counts. Both are bounds of the limit of the mesh; that of conforming
+//! meshes is above the exact one.
 
-use super::control::{add, most};
+use super::control::add;
 use super::iterate;
 use super::iteration::Newton;
 use super::snapshot::Reached;
@@ -38,13 +39,10 @@ impl Newton<'_> {
     /// The lower and the upper bound at an equilibrium; `None` if loads do not follow their work, or do none. Collective.
     pub fn bounds(&self) -> Option<Bounds> {
         let (control, problem) = (self.control.as_ref()?, &self.problem);
-        let mut v = self.mechanism();
-        problem.make_admissible_velocity(&mut v);
-        let along = control.works(problem, [&v])[0];
-        let taken = most(problem, &self.iterate.u, &v) - control.permanent_work(problem, &v);
-        let (lower, upper) = (control.reach.factor, taken / along);
-        let work = control.reach.work?;
-        (along > 0.0 && lower.is_finite() && upper.is_finite()).then_some(Bounds { lower, upper, work })
+        let of_way = control.upper(problem, &self.iterate.u, self.mechanism());
+        let upper = of_way.into_iter().chain(control.reach.upper).reduce(f64::min)?;
+        let (lower, work) = (control.reach.factor, control.reach.work?);
+        lower.is_finite().then_some(Bounds { lower, upper, work })
     }
 
     /// Goes on from an equilibrium, along its mechanism, until that has done so many times the work. Collective.
@@ -53,7 +51,7 @@ impl Newton<'_> {
         let Some(control) = &mut self.control else { return };
         let [before, along] = control.works(&self.problem, [&self.iterate.u, &v])[..] else { unreachable!() };
         control.reach.work = Some(before + (times - 1.0) * along);
-        control.reach.number += 1;
+        (control.reach.number, control.reach.upper) = (control.reach.number + 1, None);
         let mut u = self.iterate.u.clone();
         add(times - 1.0, &v, &mut u);
         self.problem.make_admissible(&mut u);
@@ -70,7 +68,7 @@ impl Newton<'_> {
         let Some(control) = &mut self.control else { return };
         let before = control.works(&self.problem, [&u])[0];
         control.reach.work = control.reach.work.map(|work| before + share * (work - before));
-        control.reach.factor = factor;
+        (control.reach.factor, control.reach.upper) = (factor, None);
         self.problem.loads = control.loads();
         self.solver.forget();
         self.begin(u, reached.as_ref().map(|reached| &reached.lambda[..]), timer);
