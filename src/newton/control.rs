@@ -33,6 +33,8 @@ use crate::vector::dot;
 
 /// The first work is that of [`strength`], on an elastic body, times this.
 const FIRST: f64 = 6.0;
+/// A step leaves so much of the factor at least.
+const LEFT: f64 = 0.1;
 /// What tangents are of the elastic stiffness at least: a mechanism is not free then, and what holds it tells how far it goes.
 const LEAST: f64 = 1e-4;
 /// Steps are up to so many times those that such tangents tell.
@@ -153,7 +155,8 @@ impl Control {
         add(change, &v, &mut step.du);
         step.lambda.iter_mut().zip(&lambda).for_each(|(l, of_v)| *l += change * of_v);
         problem.laws().project(&mut step.lambda);
-        self.change(problem, change, before, state);
+        // Displacements need this change. Loads only tell where the next step goes from, and turned round they leave contacts unheld.
+        self.change(problem, change.max((LEFT - 1.0) * self.reach.factor.abs()), before, state);
         step.is_exact = false;
         Ok(())
     }

@@ -185,6 +185,44 @@ fn soft_parts_are_squeezed_on_elastic_ones() {
     assert!(lower > 240.0 && upper < 1.02 * 240.0, "{lower} to {upper}");
 }
 
+/// A block that only contact holds on a cantilever: where the first stresses are far beyond the limit, the work is done with loads that
+/// have turned round, and would pull the block off.
+#[test]
+fn loads_do_not_turn_round_on_the_way() {
+    let directory = tempfile::tempdir().unwrap();
+    let text = r#"
+        material.soft = { young = 2e5, poisson = 0.3, yield_stress = 100.0 }
+        material.hard = { young = 2e4, poisson = 0.3, yield_stress = 1e9 }
+        [body.lower]
+        material = "soft"
+        element = "tet10"
+        brick = { origin = [0.0, 0.0, 0.0], size = [4.3, 1.36, 0.61], cells = [6, 2, 2] }
+        [body.upper]
+        material = "hard"
+        element = "tet10"
+        brick = { origin = [0.67, 0.0, 0.61], size = [3.14, 1.36, 0.61], cells = [3, 2, 2] }
+        [support]
+        end = { surface = "lower.xmin", fix = ["x", "y", "z"] }
+        along-x = { surface = "upper.xmin", fix = ["x"] }
+        along-y = { surface = "upper.ymin", fix = ["y"] }
+        [load.top]
+        surface = "upper.zmax"
+        pressure = 10.0
+        [contact.joint]
+        slave = "upper.zmin"
+        master = "lower.zmax"
+        [limit]
+        tolerance = 0.03
+        "#;
+    let scene = scene_file(directory.path(), text);
+    let [few, many] = [2, 5].map(|subdomains| {
+        let summary = solve(2, &scene, &[&format!("decomposition.subdomains={subdomains}")]).converged().summary();
+        assert!(number(&summary, "hessian_multiplications") <= 1000.0, "{}", summary["hessian_multiplications"]);
+        bounds(&summary, 0.03)
+    });
+    assert!(few[0] <= many[1] && many[0] <= few[1], "{few:?} {many:?}");
+}
+
 /// Of a mesh of 18 tetrahedra that is refined, the limit comes near the closed form from above, as it must.
 #[test]
 fn meshes_are_refined_to_a_limit() {
