@@ -33,7 +33,7 @@ use crate::vector::dot;
 
 /// The first work is that of [`strength`], on an elastic body, times this.
 const FIRST: f64 = 6.0;
-/// A step leaves so much of the factor at least.
+/// A step leaves so much of the factor at least, but for the first, which chooses the work.
 const LEFT: f64 = 0.1;
 /// What tangents are of the elastic stiffness at least: a mechanism is not free then, and what holds it tells how far it goes.
 const LEAST: f64 = 1e-4;
@@ -141,10 +141,12 @@ impl Control {
             outcome => return Err(Outcome::Inner(outcome)),
         }
         let [compliance, before, added] = self.works(problem, [&v, u, &step.du])[..] else { unreachable!() };
-        let work = match self.reach.work {
-            Some(work) => work,
-            // Where the body is without `f_1`, and from there.
-            None => before + added + (FIRST * strength(problem, &v) - self.reach.factor) * compliance,
+        let (work, least) = match self.reach.work {
+            Some(work) => (work, (LEFT - 1.0) * self.reach.factor),
+            // Where the body is without `f_1`, and from there; loads of the scene may be of any size.
+            None => {
+                (before + added + (FIRST * strength(problem, &v) - self.reach.factor) * compliance, f64::NEG_INFINITY)
+            }
         };
         self.reach.work = Some(work);
         if !(compliance > 0.0 && work.is_finite()) {
@@ -156,7 +158,7 @@ impl Control {
         step.lambda.iter_mut().zip(&lambda).for_each(|(l, of_v)| *l += change * of_v);
         problem.laws().project(&mut step.lambda);
         // Displacements need this change. Loads only tell where the next step goes from, and turned round they leave contacts unheld.
-        self.change(problem, change.max((LEFT - 1.0) * self.reach.factor.abs()), before, state);
+        self.change(problem, change.max(least), before, state);
         step.is_exact = false;
         Ok(())
     }

@@ -43,6 +43,18 @@ fn closed_forms_are_between_bounds_or_near_them() {
     assert!(number(&small(2, &[]), "hessian_multiplications") <= 256.0);
 }
 
+/// Loads of the scene are of any size: the same strip bears as much. Only the first step, which is solved relative to
+/// its loads, is less exact where these are far too large.
+#[test]
+fn loads_of_any_size_take_about_as_many_applications_of_the_dual_operator() {
+    let [plain, large] = [2519.0, 2519e3].map(|pressure| {
+        let summary = solve(2, STRIP, &[&format!("load.stamp.pressure={pressure:?}")]).converged().summary();
+        (number(&summary["limit_load"], "factor") * pressure, number(&summary, "hessian_multiplications"))
+    });
+    assert!((large.0 / plain.0 - 1.0).abs() < 1e-3, "{large:?} {plain:?}");
+    assert!(large.1 <= 1.5 * plain.1, "{large:?} {plain:?}");
+}
+
 /// Bounds that are far apart have those between them, but for the residual, that are near each other.
 #[test]
 fn wide_bounds_contain_narrow_ones() {
