@@ -13,6 +13,7 @@ mod elements;
 mod faults;
 mod files;
 mod friction;
+mod friction_costs;
 mod fuzz;
 mod gmsh;
 mod hard;
