@@ -7,7 +7,7 @@
 //! No rank sees a surface whole. A rank has its own faces with two layers around them, and asks for the faces of the other side
 //! that are along the normals of these ([`patch`]). What it makes of them has the bits that the whole surfaces would give.
 //! [`known`] numbers the conditions and brings them to the ranks that have copies of their nodes. [`consistency`] is
-//! what they cost a solution.
+//! what they cost a solution, and [`entry`] what they miss of obstacles.
 
 pub mod areas;
 pub mod clip;
@@ -15,6 +15,7 @@ pub mod consistency;
 pub mod corner;
 pub mod dual;
 pub mod edge;
+pub mod entry;
 pub mod known;
 pub mod matching;
 pub mod mortar;

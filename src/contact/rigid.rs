@@ -18,7 +18,7 @@ use crate::scene::Obstacle;
 use crate::vector::{difference, dot};
 
 /// Cosine between the direction to the obstacle and the outward normal from which a surface faces the obstacle.
-const FACING: f64 = 1e-6;
+pub(super) const FACING: f64 = 1e-6;
 
 /// Share of the radius within which a point is at the centre: every direction leads out.
 const CENTRE: f64 = 1e-9;
@@ -74,7 +74,7 @@ pub fn share(obstacle: &Obstacle) -> f64 {
 
 /// The unit direction from a point straight into the obstacle, and the distance (negative inside). Where all directions
 /// are alike it is the surface's outward normal.
-fn approach(obstacle: &Obstacle, x: [f64; 3], outward: [f64; 3]) -> Option<([f64; 3], f64)> {
+pub(super) fn approach(obstacle: &Obstacle, x: [f64; 3], outward: [f64; 3]) -> Option<([f64; 3], f64)> {
     match obstacle {
         Obstacle::Plane { point, normal } => {
             let free = unit(*normal)?;

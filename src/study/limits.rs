@@ -1,5 +1,5 @@
-//! The limits of the theory, which is of small strains and small displacements: how near a solution comes to them, and what
-//! to tell where it is beyond.
+//! The limits of the theory, which is of small strains and small displacements, and of the mesh: how near a solution comes to them,
+//! and what to tell where it is beyond.
 //!
 //! | measure | limit | why |
 //! |---|---|---|
@@ -9,11 +9,14 @@
 //! | sliding of a closed slave node over the longest edge of its facets | 1 | it presses on what it faced at the start |
 //! | gap that closes over the diagonal of the slave's body | 0.1 | normals and partners are those of before |
 //! | overlap at the start over the extent of the thinner body along the normal | 0.1 | as a strain |
+//! | pressure that is missing where an obstacle enters faces between their nodes, as a share | 0.5 | the mesh does not know where it touches |
 //! | rounding of coordinates over the largest strain times the diagonal of its body | 1e-3 | gaps are rounded so |
 //!
 //! Each is the largest over elements or contact conditions, and keeps the place. All but the overlap, which is known at the
 //! start, are measured at every increment that converges; the worst is told. Where a strain is singular, as at an edge that
 //! presses, it grows without bound on finer meshes.
+
+mod missed;
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -40,6 +43,7 @@ const ROTATION: f64 = 0.1;
 const DISPLACEMENT: f64 = 0.1;
 const SLIDING: f64 = 1.0;
 const CLOSED_GAP: f64 = 0.1;
+const MISSED_PRESSURE: f64 = 0.5;
 const ROUNDING: f64 = 1e-3;
 
 /// Strains below are round-off.
@@ -65,8 +69,8 @@ impl Worst {
 
 /// Measures of bodies: strain, rotation, displacement, and the strain times its body's diagonal (length).
 const OF_BODIES: usize = 4;
-/// Measures of contacts: sliding and the gap that closes.
-const OF_CONTACTS: usize = 2;
+/// Measures of contacts: sliding, the gap that closes, and the pressure that is missing.
+const OF_CONTACTS: usize = 3;
 
 /// How near a solution comes to the limits. Collective.
 pub(super) fn measure(
@@ -96,6 +100,7 @@ pub(super) fn measure(
             }
         }
     }
+    missed::add(&mut worst[6], comm, scene, discrete, newton, contact);
     let worst = worst.map(|w| {
         let [value, of, place @ ..] =
             of_largest(comm, w.value, [w.value, w.of as f64, w.place[0], w.place[1], w.place[2]]);
@@ -106,14 +111,15 @@ pub(super) fn measure(
         (value > 0.0 && value.is_finite()).then(|| Extreme { value, of: name(of), at: place })
     };
     let body = |of: usize| scene.body.keys().nth(of).cloned().unwrap_or_default();
-    let contact = |of: usize| discrete.contacts.names.get(of).cloned().unwrap_or_default();
+    let of_contact = |of: usize| discrete.contacts.names.get(of).cloned().unwrap_or_default();
     Measures {
         max_strain: found(0, &body),
         max_rotation: found(1, &body),
         max_relative_displacement: found(2, &body),
         max_rounding: rounding(scene, discrete, &worst[..OF_BODIES]),
-        max_sliding: found(4, &contact),
-        max_closed_gap: found(5, &contact),
+        max_sliding: found(4, &of_contact),
+        max_closed_gap: found(5, &of_contact),
+        max_missed_pressure: found(6, &of_contact),
     }
 }
 
@@ -213,9 +219,7 @@ pub(super) fn warnings(scene: &Scene, rows: &[StepRow]) -> Vec<String> {
         let (reached, place) = (short(*value), shown(*at));
         let text = || {
             let consequence = consequence(*value);
-            format!(
-                "{what} {of} reaches {reached} near {place}{when}, more than the theory allows ({limit}): {consequence}"
-            )
+            format!("{what} {of} reaches {reached} near {place}{when}, more than is sound ({limit}): {consequence}")
         };
         (*value > limit).then(text)
     };
@@ -237,6 +241,12 @@ pub(super) fn warnings(scene: &Scene, rows: &[StepRow]) -> Vec<String> {
         tell(|m| &m.max_closed_gap, CLOSED_GAP, "the gap that closes, in sizes of its body, in contact", &|_| {
             format!("normals and partners are those of before; {to_begin_nearer}")
         }),
+        tell(
+            |m| &m.max_missed_pressure,
+            MISSED_PRESSURE,
+            "the share of the pressure that is missing between nodes of contact",
+            &|_| "the obstacle is inside of faces that it should press on; refine the mesh there".to_owned(),
+        ),
         tell(
             |m| &m.max_rounding,
             ROUNDING,

@@ -7,6 +7,7 @@ use crate::record::state::Extreme;
 use crate::record::summary::Summary;
 use crate::scene::Scene;
 use crate::study;
+use crate::vector::{difference, length};
 
 /// What a built-in scene ends with after these changes, the same on any ranks.
 fn solve(name: &str, sets: &[&str]) -> Summary {
@@ -134,4 +135,32 @@ fn coordinates_too_large_for_the_strain_are_told() {
     let rounding = found.state.measures.max_rounding.unwrap().value;
     let stretch = found.state.measures.max_strain.unwrap().value * 3e6_f64.sqrt();
     assert!((rounding / (f64::EPSILON * 1e10 / stretch) - 1.0).abs() < 1e-2);
+}
+
+/// A ball in a block, above the middle of a face: where nodes are too far away they do not know of it.
+#[test]
+fn an_obstacle_between_nodes_is_told() {
+    let solved = |depth: f64, cells: usize| {
+        let sets = [
+            format!("contact.ball.rigid.sphere.centre=[0.75, 0.75, {}]", 1.6 - depth),
+            format!("body.cube.brick.cells=[{cells}, {cells}, 5]"),
+            "decomposition.cells=[5, 5, 5]".to_owned(),
+            "body.cube.element=\"hex8\"".to_owned(),
+            "material.metal.yield_stress=1e9".to_owned(),
+        ];
+        solve("step-42", &sets.each_ref().map(|set| &set[..]))
+    };
+    // Corners of the face are 4.2e-3 from the undeformed ball.
+    let missed = solved(3e-3, 5);
+    assert_is(&missed.state.measures.max_missed_pressure, "ball", 1.0);
+    assert!(length(difference(missed.state.measures.max_missed_pressure.unwrap().at, [0.75, 0.75, 1.0])) < 1e-12);
+    assert!(missed.warnings.len() == 1 && missed.warnings[0].contains("between nodes of contact ball"));
+    // What enters a face grows with the square of its width, the pressure does not change.
+    let [coarse, fine] = [15, 25].map(|cells| {
+        let found = solved(0.01, cells);
+        assert_eq!(found.warnings, Vec::<String>::new());
+        let share = found.state.measures.max_missed_pressure.expect("the ball is between nodes").value;
+        share / (1.0 - share)
+    });
+    assert!((coarse / fine / (25.0 / 15.0) - 1.0).abs() < 0.3, "{coarse} {fine}");
 }
