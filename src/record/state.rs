@@ -99,7 +99,7 @@ pub struct Measures {
     pub max_sliding: Option<Extreme>,
     /// Gap that closed over the diagonal of the slave's body.
     pub max_closed_gap: Option<Extreme>,
-    /// Share of the pressure of an obstacle that is missing, since it enters faces between their nodes.
+    /// Share of the pressure that is missing, since the other side enters faces of the slave between their nodes.
     pub max_missed_pressure: Option<Extreme>,
     /// Rounding of coordinates over what bodies are strained by (strain times the diagonal); null without contact.
     pub max_rounding: Option<Extreme>,

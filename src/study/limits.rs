@@ -9,7 +9,7 @@
 //! | sliding of a closed slave node over the longest edge of its facets | 1 | it presses on what it faced at the start |
 //! | gap that closes over the diagonal of the slave's body | 0.1 | normals and partners are those of before |
 //! | overlap at the start over the extent of the thinner body along the normal | 0.1 | as a strain |
-//! | pressure that is missing where an obstacle enters faces between their nodes, as a share | 0.5 | the mesh does not know where it touches |
+//! | pressure that is missing where the other side enters faces of the slave between their nodes, as a share | 0.5 | the mesh does not know where it touches |
 //! | rounding of coordinates over the largest strain times the diagonal of its body | 1e-3 | gaps are rounded so |
 //!
 //! Each is the largest over elements or contact conditions, and keeps the place. All but the overlap, which is known at the
@@ -20,6 +20,7 @@ mod missed;
 
 use std::collections::{BTreeSet, HashMap};
 
+use self::missed::Missed;
 use super::cascade::fetch;
 use super::contact::ContactState;
 use crate::assembly::gradients;
@@ -89,6 +90,7 @@ pub(super) fn measure(
     let owned = problem.space.owned();
     let pairs = owned.iter().cloned().flatten().filter_map(closed).map(|pair| &discrete.contacts.pairs[pair]);
     let nodes = pairs.flat_map(|pair| pair.slaves.iter().chain(&pair.masters).map(|(node, _)| *node));
+    let nodes = nodes.chain(missed::nodes(scene, discrete));
     let of_nodes = displacements(comm, discrete, u, nodes);
     let mut worst = [Worst::NONE; OF_BODIES + OF_CONTACTS];
     let subdomains = problem.subdomains.iter().zip(u).zip(owned);
@@ -100,7 +102,8 @@ pub(super) fn measure(
             }
         }
     }
-    missed::add(&mut worst[6], comm, scene, discrete, newton, contact);
+    let strain = worst[0].value;
+    Missed { scene, discrete, newton, of_nodes: &of_nodes }.add(&mut worst[6], comm, contact, strain);
     let worst = worst.map(|w| {
         let [value, of, place @ ..] =
             of_largest(comm, w.value, [w.value, w.of as f64, w.place[0], w.place[1], w.place[2]]);
@@ -245,7 +248,7 @@ pub(super) fn warnings(scene: &Scene, rows: &[StepRow]) -> Vec<String> {
             |m| &m.max_missed_pressure,
             MISSED_PRESSURE,
             "the share of the pressure that is missing between nodes of contact",
-            &|_| "the obstacle is inside of faces that it should press on; refine the mesh there".to_owned(),
+            &|_| "the other side is inside of faces that it should press on; refine the slave there".to_owned(),
         ),
         tell(
             |m| &m.max_rounding,
