@@ -9,14 +9,18 @@ use crate::scene::Scene;
 use crate::study;
 use crate::vector::{difference, length};
 
-/// What a built-in scene ends with after these changes, the same on any ranks.
+/// What a built-in scene ends with after these changes.
 fn solve(name: &str, sets: &[&str]) -> Summary {
     let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-    let scene = Scene::load(name, 1, &sets).unwrap();
+    solve_scene(&Scene::load(name, 1, &sets).unwrap())
+}
+
+/// What a scene ends with, the same on any ranks.
+fn solve_scene(scene: &Scene) -> Summary {
     let mut found = RANKS.into_iter().map(|ranks| {
         let summaries = threads::run(ranks, |comm| {
-            let discrete = crate::model::discrete::discretise(&scene, comm).unwrap();
-            study::solve(&scene, &discrete, comm, study::Begin::Rest, &Timer::start(), &mut ()).unwrap().summary
+            let discrete = crate::model::discrete::discretise(scene, comm).unwrap();
+            study::solve(scene, &discrete, comm, study::Begin::Rest, &Timer::start(), &mut ()).unwrap().summary
         });
         assert!(summaries.iter().all(|s| s.warnings == summaries[0].warnings));
         summaries.into_iter().next().unwrap()
@@ -163,4 +167,45 @@ fn an_obstacle_between_nodes_is_told() {
         share / (1.0 - share)
     });
     assert!((coarse / fine / (25.0 / 15.0) - 1.0).abs() < 0.3, "{coarse} {fine}");
+}
+
+/// A hard ball in a soft block, whose faces are far wider than the ball's and are the slave's.
+#[test]
+fn a_master_between_nodes_is_told() {
+    let solved = |cells: usize| {
+        let brick =
+            format!("brick = {{ origin = [-0.5, -0.5, 1.0], size = [1.0, 1.0, 0.5], cells = [{cells}, {cells}, 2] }}");
+        let text = format!(
+            r#"
+            [material.soft]
+            young = 1e3
+            poisson = 0.3
+            [material.hard]
+            young = 1e5
+            poisson = 0.3
+            [body.block]
+            material = "soft"
+            element = "tet4"
+            {brick}
+            [body.ball]
+            material = "hard"
+            element = "tet4"
+            sphere = {{ inner = 0.5, outer = 1.0, cells = [8, 2] }}
+            [support.top]
+            surface = "block.zmax"
+            fix = ["x", "y", "z"]
+            displacement = [0.0, 0.0, -0.005]
+            [support.inner]
+            surface = "ball.inner"
+            fix = ["x", "y", "z"]
+            [contact.fit]
+            surfaces = ["block.zmin", "ball.outer"]
+            "#
+        );
+        solve_scene(&Scene::from_text(&text, "hard ball", 1, &[]).unwrap())
+    };
+    let missed = solved(3);
+    assert_is(&missed.state.measures.max_missed_pressure, "fit", 1.0);
+    assert!(missed.warnings.iter().any(|w| w.contains("between nodes of contact fit")), "{:?}", missed.warnings);
+    assert!(solved(9).warnings.iter().all(|w| !w.contains("between nodes")));
 }
