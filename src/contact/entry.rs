@@ -1,7 +1,7 @@
 //! How deep an obstacle is in a face of the slave between its nodes.
 //!
-//! Conditions hold nodes out of an obstacle. A ball that presses less deep than faces are wide is in a face between them, and may touch no node at
-//! all. The distance is that of [`super::rigid`], linearised at each place of the face as it is there at nodes:
+//! Conditions hold nodes out of an obstacle. A ball that presses less deep than faces are wide is in a face between them, and may
+//! touch no node at all. The distance is that of [`super::rigid`], linearised at each place of the face as it is there at nodes:
 //! `d(x) = g(x) - n(x) . (u(x) - w)`, with `w` what the obstacle is moved by.
 //!
 //! Places are the middles of the face and of its edges; on quadratic faces those of its four parts.
@@ -62,14 +62,18 @@ mod tests {
 
     const BALL: Obstacle = Obstacle::Sphere { centre: [0.3, 0.3, 2.0], radius: 2.0, inside: false };
 
+    /// A flat quadratic face with straight edges.
+    fn quadratic([a, b, c]: [[f64; 3]; 3]) -> [[f64; 3]; 6] {
+        let middle = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
+        [a, b, c, middle(a, b), middle(b, c), middle(c, a)]
+    }
+
     /// The ball touches the face at a place between its nodes, and these are pushed towards it, or bent to its shape.
     #[test]
     fn a_ball_between_nodes_is_as_deep_as_they_are_pushed() {
         let square = [[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.6, 0.6, 0.0], [0.0, 0.6, 0.0]];
         let triangle = [square[0], [0.9, 0.0, 0.0], [0.0, 0.9, 0.0]];
-        let middle = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]));
-        let [a, b, c] = triangle;
-        let quadratic = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
+        let quadratic = quadratic(triangle);
         for (face, width) in
             [(&square[..], 0.6), (&triangle, 0.9 * 2.0_f64.sqrt()), (&quadratic, 0.45 * 2.0_f64.sqrt())]
         {
@@ -87,13 +91,10 @@ mod tests {
 
     #[test]
     fn quadratic_faces_bend_around_a_ball() {
-        let corners: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.0, 0.6, 0.0]];
-        let middle = |a: usize, b: usize| [0, 1, 2].map(|k| 0.5 * (corners[a][k] + corners[b][k]));
-        let [a, b, c] = corners;
-        let face = [a, b, c, middle(0, 1), middle(1, 2), middle(2, 0)];
-        let onto = |[x, y, _]: [f64; 3]| [0.0, 0.0, -((x - 0.3_f64).powi(2) + (y - 0.3_f64).powi(2)) / 4.0];
-        // Nodes are on the paraboloid, or only nearly on the ball.
-        let moved: Vec<_> = face.iter().map(|place| onto(*place).map(|z| -z)).collect();
+        let face = quadratic([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.0, 0.6, 0.0]]);
+        let onto = |[x, y, _]: [f64; 3]| [0.0, 0.0, ((x - 0.3_f64).powi(2) + (y - 0.3_f64).powi(2)) / 4.0];
+        // Nodes are on a paraboloid, nearly on the ball.
+        let moved = face.map(onto);
         let linear = deepest(&BALL, &face[..3], &moved[..3], 0.0).expect("the ball is inside");
         assert!((linear.depth - 0.18 / 4.0).abs() < 1e-3, "{linear:?}");
         assert!(deepest(&BALL, &face, &moved, 0.0).is_none_or(|entry| entry.depth < 1e-3));

@@ -10,6 +10,7 @@ use std::collections::HashMap;
 
 use crate::constraint::law::Status;
 use crate::contact::MasterNode;
+use crate::contact::known::Pairs;
 use crate::decomposition::Subdomain;
 use crate::model::contacts::Contacts;
 use crate::newton::friction::Rubbing;
@@ -28,6 +29,13 @@ pub struct ContactState {
     pub status: Status,
     /// Friction, if there is any.
     pub friction: Option<Rubbing>,
+}
+
+impl ContactState {
+    /// Force over the area of the condition (stress); the condition must be known here.
+    pub fn pressure(&self, pairs: &Pairs) -> f64 {
+        self.force / pairs[self.pair].area
+    }
 }
 
 /// Contact at the nodes of a rank's subdomains.
@@ -85,7 +93,7 @@ struct Known<'a> {
 
 impl<'a> Known<'a> {
     fn new(Contacts { pairs, masters, .. }: &'a Contacts, states: &'a [ContactState]) -> Self {
-        let pressures = states.iter().map(|state| (state.pair, state.force / pairs[state.pair].area)).collect();
+        let pressures = states.iter().map(|state| (state.pair, state.pressure(pairs))).collect();
         let rubbed = states.iter().filter_map(|state| {
             let Rubbing { force, total, is_given, .. } = state.friction?;
             let pair = &pairs[state.pair];

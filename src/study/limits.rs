@@ -114,15 +114,15 @@ pub(super) fn measure(
         (value > 0.0 && value.is_finite()).then(|| Extreme { value, of: name(of), at: place })
     };
     let body = |of: usize| scene.body.keys().nth(of).cloned().unwrap_or_default();
-    let of_contact = |of: usize| discrete.contacts.names.get(of).cloned().unwrap_or_default();
+    let contact = |of: usize| discrete.contacts.names.get(of).cloned().unwrap_or_default();
     Measures {
         max_strain: found(0, &body),
         max_rotation: found(1, &body),
         max_relative_displacement: found(2, &body),
         max_rounding: rounding(scene, discrete, &worst[..OF_BODIES]),
-        max_sliding: found(4, &of_contact),
-        max_closed_gap: found(5, &of_contact),
-        max_missed_pressure: found(6, &of_contact),
+        max_sliding: found(4, &contact),
+        max_closed_gap: found(5, &contact),
+        max_missed_pressure: found(6, &contact),
     }
 }
 

@@ -96,8 +96,8 @@ impl<'a> Recorder<'a> {
         let mut distances = bregman::distances(problem.sums, &problem.regions(), u, self.scene.has_limit_load());
         let moved = limits::displacements(self.comm, discrete, u, self.touching.iter().flat_map(Touching::nodes));
         let of_state = |state: &ContactState| {
-            let pair = &discrete.contacts.pairs[state.pair];
-            let known = State { pressure: state.force / pair.area, gap: state.gap };
+            let pairs = &discrete.contacts.pairs;
+            let (pair, known) = (&pairs[state.pair], State { pressure: state.pressure(pairs), gap: state.gap });
             ((pair.contact, pair.slave, pair.part), known)
         };
         let states: HashMap<(usize, u64, u32), State> = contact.iter().map(of_state).collect();

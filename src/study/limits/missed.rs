@@ -1,8 +1,8 @@
 //! The pressure that is missing where the other side enters faces of the slave between their nodes.
 //!
-//! To push a face of width `h` back by the depth `d` takes a stress of about `s(d / h)`, what the softest material of the contact as it is
-//! at rest answers to a compression by that strain that keeps the volume: `3 mu d / h`, or what it yields at. Beside the largest pressure `p`
-//! of the contact that is the share
+//! To push a face of width `h` back by the depth `d` takes a stress of about `s(d / h)`, what the softest material of the contact, as it
+//! is at rest, answers to a compression by that strain that keeps the volume: `3 mu d / h`, or what it yields at. Beside the largest
+//! pressure `p` of the contact that is the share
 //!
 //! ```text
 //! s(d / h) / (p + s(d / h))
@@ -23,6 +23,7 @@ use crate::contact::entry::{self, Entry};
 use crate::contact::{MasterNode, Site};
 use crate::material::{Law, Material, Variables};
 use crate::model::Discrete;
+use crate::model::contacts::{Contacts, Surfaces};
 use crate::newton::Newton;
 use crate::scene::{Contact, Obstacle, Scene, Sides};
 use crate::tensor::von_mises;
@@ -31,19 +32,27 @@ use crate::vector::{difference, dot};
 /// Depths over widths below this share of the largest strain are none.
 const NOTICED: f64 = 0.01;
 
-/// Master nodes of contacts by means over meshes whose distances count.
-fn masters<'a>(scene: &Scene, discrete: &'a Discrete) -> impl Iterator<Item = &'a MasterNode> {
-    let counts: Vec<bool> = scene.contact.values().map(|contact| contact.clearance.is_none()).collect();
-    discrete.contacts.masters.iter().filter(move |master| counts[master.contact] && !master.matches)
+/// Which contacts are looked at. Planes enter no face whose nodes are outside, nodes that meet nodes have conditions of their own, and
+/// distances that are given are not those of the places.
+fn looked_at(scene: &Scene, discrete: &Discrete) -> Vec<bool> {
+    let of = |(contact, surfaces): (&Contact, &Surfaces)| {
+        let may_enter = match &contact.sides {
+            Sides::Rigid { obstacle, .. } => !matches!(obstacle, Obstacle::Plane { .. }),
+            Sides::Named { .. } | Sides::Either(_) => surfaces.is_mortar,
+        };
+        may_enter && contact.clearance.is_none()
+    };
+    scene.contact.values().zip(&discrete.contacts.surfaces).map(of).collect()
 }
 
 /// Nodes whose displacements are needed.
 pub(super) fn nodes(scene: &Scene, discrete: &Discrete) -> impl Iterator<Item = u64> {
-    let slaves = |master: &MasterNode| {
+    let looked_at = looked_at(scene, discrete);
+    let of_master = |master: &MasterNode| {
         let pairs = master.pairs.iter().filter_map(|(pair, _)| discrete.contacts.pairs.get(*pair));
         pairs.map(|pair| pair.slave).chain([master.node]).collect::<Vec<_>>()
     };
-    masters(scene, discrete).flat_map(slaves)
+    discrete.contacts.masters.iter().filter(move |master| looked_at[master.contact]).flat_map(of_master)
 }
 
 /// A solution, and the displacements of [`nodes`].
@@ -58,14 +67,19 @@ impl Missed<'_> {
     /// Adds the largest share of all contacts; `strain` is the largest one of this rank. Collective.
     pub fn add(&self, worst: &mut Worst, comm: &dyn Comm, states: &[ContactState], strain: f64) {
         let &Self { scene, discrete, .. } = self;
+        let pairs = &discrete.contacts.pairs;
         let mut most = vec![strain];
         most.resize(1 + scene.contact.len(), 0.0);
         for state in states {
-            let pair = &discrete.contacts.pairs[state.pair];
-            most[1 + pair.contact] = most[1 + pair.contact].max(state.force / pair.area);
+            let of = 1 + pairs[state.pair].contact;
+            most[of] = most[of].max(state.pressure(pairs));
         }
         let most = maximum(comm, &most);
+        let looked_at = looked_at(scene, discrete);
         for ((number, (name, contact)), pressure) in scene.contact.iter().enumerate().zip(&most[1..]) {
+            if !looked_at[number] {
+                continue;
+            }
             let Worst { value, place: [x, y, z], .. } = match &contact.sides {
                 Sides::Rigid { obstacle, .. } => self.in_faces((number, name, contact), obstacle),
                 Sides::Named { .. } | Sides::Either(_) => self.at_masters(number, contact),
@@ -80,12 +94,9 @@ impl Missed<'_> {
         }
     }
 
-    /// The largest depth of an obstacle over the width of a face. Planes enter no face whose nodes are outside.
+    /// The largest depth of an obstacle over the width of a face.
     fn in_faces(&self, (number, name, contact): (usize, &str, &Contact), obstacle: &Obstacle) -> Worst {
         let mut most = Worst::NONE;
-        if contact.clearance.is_some() || matches!(obstacle, Obstacle::Plane { .. }) {
-            return most;
-        }
         let factor = obstacle_factor(self.scene, name, self.newton.at());
         let moved = contact.displacement().map(|d| d * factor);
         let slave = self.discrete.contacts.surfaces[number].slave;
@@ -105,8 +116,8 @@ impl Missed<'_> {
     /// The largest depth of a master node in a face of the slave over the width of that.
     fn at_masters(&self, number: usize, contact: &Contact) -> Worst {
         let mut most = Worst::NONE;
-        let pairs = &self.discrete.contacts.pairs;
-        for master in masters(self.scene, self.discrete).filter(|master| master.contact == number) {
+        let Contacts { pairs, masters, .. } = &self.discrete.contacts;
+        for master in masters.iter().filter(|master| master.contact == number) {
             let of_pair = |&(index, weight): &(usize, f64)| {
                 let pair = pairs.get(index)?;
                 let motion = difference(self.of_nodes[&master.node], self.of_nodes[&pair.slave]);
