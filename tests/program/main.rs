@@ -29,6 +29,7 @@ mod memory;
 mod mortar;
 mod numbers;
 mod patch;
+mod random_numbers;
 mod ranks;
 mod refined;
 mod results;
