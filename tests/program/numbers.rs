@@ -22,7 +22,8 @@ fn scene(name: &str) -> String {
     format!("{}/scenes/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-fn last(summary: &Value) -> &Value {
+/// The row of the last mesh.
+pub fn last(summary: &Value) -> &Value {
     summary["refinements"].as_array().unwrap().last().unwrap()
 }
 

@@ -2,6 +2,7 @@
 
 use crate::common::random::Random;
 use crate::common::{number, scene_file, solve_with};
+use crate::numbers::last;
 use crate::twins::Block;
 use serde_json::Value;
 
@@ -72,12 +73,7 @@ fn numbers_of_random_scenes_are_as_exact_as_told() {
         let ask = |error: f64, most: &str| -> Value {
             let error = error.to_string();
             let options = ["--error", &error, "--error-of", &number_of, "--max-unknowns", most];
-            solve_with(2, &path, 1, scene.yields, &options).summary()["refinements"]
-                .as_array()
-                .unwrap()
-                .last()
-                .unwrap()
-                .clone()
+            last(&solve_with(2, &path, 1, scene.yields, &options).summary()).clone()
         };
         let [told, finer] = [ask(error, "60000"), ask(FINER * error, "150000")];
         let [value, other] = [&told, &finer].map(|row| number(&row["goal"], "value"));

@@ -29,8 +29,7 @@
 //!
 //! with the largest `theta` of the last three meshes as above, at least `LEAST_OF_NUMBER`; until there is one, `UNKNOWN_OF_NUMBER` or
 //! what nearer meshes tell. Measured over the error, from the second mesh that tells: 0.35 to 500, half of them up to 4, one of 40 below 1.
-//! Where curved surfaces of linear elements touch whose meshes do not match, conditions have an
-//! error that is in neither.
+//! Where curved surfaces of linear elements touch whose meshes do not match, conditions have an error that is in neither.
 
 use crate::record::rows::{GoalRow, RefinementRow};
 use crate::scene::ErrorOf;
@@ -86,14 +85,9 @@ fn of_goal(meshes: &[RefinementRow]) -> f64 {
     if vanishes(&last) {
         return f64::INFINITY;
     }
-    let before = || meshes.iter().rev().skip(1).filter_map(|row| row.goal);
-    let below = |apart: f64| {
-        move |coarse: &GoalRow| coarse.distance > last.distance && coarse.distance >= apart * last.distance
-    };
-    let theta = |coarse: GoalRow| (coarse.value - last.value).abs() / (coarse.distance - last.distance);
-    let told = before().filter(below(APART)).take(3).map(theta).reduce(f64::max);
-    let near = || before().filter(below(1.0)).map(theta).fold(UNKNOWN_OF_NUMBER, f64::max).min(LARGEST);
-    let theta = told.unwrap_or_else(near).max(LEAST_OF_NUMBER);
+    let before = meshes.iter().rev().skip(1).filter_map(|row| row.goal);
+    let changes = before.map(|coarse| [(coarse.value - last.value).abs(), coarse.distance]);
+    let theta = told(changes, last.distance, 3, UNKNOWN_OF_NUMBER).max(LEAST_OF_NUMBER);
     (theta * last.distance).max(SAFETY_OF_SUM * last.correction.abs()) / last.value.abs()
 }
 
@@ -135,22 +129,27 @@ fn compares(coarse: &RefinementRow, fine: &RefinementRow) -> bool {
     work(coarse) == work(fine)
 }
 
-/// `theta`.
+/// `theta` of energies.
 fn factor(meshes: &[RefinementRow]) -> f64 {
     let Some((fine, coarser)) = meshes.split_last() else { return UNKNOWN };
-    let below = |apart: f64| move |coarse: &&RefinementRow| coarse.distance >= apart * fine.distance;
-    let theta = |coarse: &RefinementRow| (coarse.energy - fine.energy) / (coarse.distance - fine.distance);
     let of_contact = |share: f64| move |row: &RefinementRow| row.consistency > share * row.distance;
     let is_plain = |coarse: &&RefinementRow| compares(coarse, fine) && !of_contact(PLAIN)(coarse);
-    let before = || coarser.iter().rev().filter(is_plain);
-    let told = before().filter(below(APART)).take(2).map(theta).reduce(f64::max);
-    let near = || before().filter(below(1.0)).map(theta).fold(UNKNOWN, f64::max).min(LARGEST);
+    let before = coarser.iter().rev().filter(is_plain);
     let least = match fine.limit_load {
         Some(_) => LEAST_OF_LIMIT,
         None if meshes.iter().any(of_contact(NOTICED)) => LEAST_OF_CONTACT,
         None => LEAST,
     };
-    told.unwrap_or_else(near).max(least)
+    told(before.map(|coarse| [coarse.energy - fine.energy, coarse.distance]), fine.distance, 2, UNKNOWN).max(least)
+}
+
+/// The largest `theta` with the last `count` meshes that are far enough from one of this `distance`. Until there is one, `unknown`, or what
+/// nearer ones tell. `changes` are those from each mesh before, the last one first, with its distance.
+fn told(changes: impl Iterator<Item = [f64; 2]> + Clone, distance: f64, count: usize, unknown: f64) -> f64 {
+    let below = |apart: f64| move |&[_, coarse]: &[f64; 2]| coarse >= apart * distance;
+    let theta = |[change, coarse]: [f64; 2]| change / (coarse - distance);
+    let far = changes.clone().filter(below(APART)).take(count).map(theta).reduce(f64::max);
+    far.unwrap_or_else(|| changes.filter(below(1.0)).map(theta).fold(unknown, f64::max).min(LARGEST))
 }
 
 #[cfg(test)]
@@ -224,6 +223,7 @@ mod tests {
         assert_eq!(error(&[of_number(18.0, 1.0, 3.0), of_number(8.0, 0.5, 2.0)]), LARGEST * 2.0 / 8.0);
         // Exact in any case: forces that balance loads.
         assert_eq!(error(&[of_number(8.0, 0.0, 0.0)]), 0.0);
+        assert_eq!(error(&[of_number(8.5, 0.0, 0.0), of_number(8.0, 0.0, 0.0)]), 0.0);
         let nothing = RefinementRow {
             goal: Some(GoalRow { value: 1e-9, terms: 1.0, ..GoalRow::default() }),
             ..meshes[0].clone()
