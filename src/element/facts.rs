@@ -45,9 +45,9 @@ pub trait Element<const N: usize, const P: usize> {
     /// How Gmsh knows it.
     const GMSH: Gmsh;
 
-    /// The integration points of the element on these nodes, or `None` if its [shape](Self::shape) is
-    /// [`DEGENERATE`](super::DEGENERATE).
-    fn points(nodes: &Nodal<N>) -> Option<[Point<N>; P]>;
+    /// The integration points of the element on these nodes. They mean nothing if its [shape](Self::shape) is
+    /// [`DEGENERATE`](super::DEGENERATE), which a mesh is checked for once.
+    fn points(nodes: &Nodal<N>) -> [Point<N>; P];
 
     /// Values of the shape functions at the integration points.
     fn values_at_points() -> [[f64; N]; P];

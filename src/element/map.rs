@@ -12,8 +12,9 @@ pub fn determinant<const N: usize>(nodes: &Nodal<N>, derivatives: &Nodal<N>) -> 
 /// A point of unit weight in the reference element, without dilatation.
 #[inline]
 pub fn point<const N: usize>(nodes: &Nodal<N>, derivatives: &Nodal<N>) -> Point<N> {
-    let (determinant, [a, b, c]) = jacobian(nodes, derivatives);
-    let gradient = |d: [f64; 3]| std::array::from_fn(|i| (a[i] * d[0] + b[i] * d[1] + c[i] * d[2]) / determinant);
+    let (determinant, cofactors) = jacobian(nodes, derivatives);
+    let [a, b, c] = cofactors.map(|row| row.map(|x| x / determinant));
+    let gradient = |d: [f64; 3]| std::array::from_fn(|i| a[i] * d[0] + b[i] * d[1] + c[i] * d[2]);
     Point { weight: determinant, gradients: derivatives.map(gradient), dilatation: None }
 }
 
