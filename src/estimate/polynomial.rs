@@ -35,9 +35,12 @@ const DEGREES: [i32; MOST] = [0, 1, 1, 1, 2, 2, 2, 2, 2, 2];
 /// Adds a sample to the sums of a node.
 pub fn add(n: usize, way: [f64; 3], stress: &Voigt, sums: &mut [f64]) {
     let m = at(way);
-    let (moments, products) = sums.split_at_mut(n * (n + 1) / 2);
-    let pairs = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
-    moments.iter_mut().zip(pairs).for_each(|(moment, (i, j))| *moment += m[i] * m[j]);
+    let (mut moments, products) = sums.split_at_mut(n * (n + 1) / 2);
+    for (i, mi) in m[..n].iter().enumerate() {
+        let (row, others) = moments.split_at_mut(i + 1);
+        row.iter_mut().zip(&m).for_each(|(moment, mj)| *moment += mi * mj);
+        moments = others;
+    }
     for (row, m) in products.as_chunks_mut::<6>().0.iter_mut().zip(m) {
         row.iter_mut().zip(stress).for_each(|(sum, s)| *sum += m * s);
     }

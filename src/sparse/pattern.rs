@@ -22,18 +22,19 @@ pub struct Pattern {
 impl Pattern {
     /// Of elements on `nodes` nodes, with all nodes of `clique` coupled besides.
     pub fn new(nodes: usize, elements: &Elements, clique: &[u32]) -> Self {
-        let among = |nodes| pairs(nodes).filter(|(a, b)| a != b);
-        let mut pairs: Vec<(u32, u32)> = elements.iter().chain([clique]).flat_map(among).collect();
+        // One number a pair: these are sorted faster.
+        let among = |nodes| pairs(nodes).filter(|(a, b)| a != b).map(|(a, b)| u64::from(a) << 32 | u64::from(b));
+        let mut pairs: Vec<u64> = elements.iter().chain([clique]).flat_map(among).collect();
         pairs.sort_unstable();
         pairs.dedup();
         let mut begins = vec![0; nodes + 1];
-        for &(a, _) in &pairs {
-            begins[a as usize + 1] += 1;
+        for &pair in &pairs {
+            begins[(pair >> 32) as usize + 1] += 1;
         }
         for a in 0..nodes {
             begins[a + 1] += begins[a];
         }
-        let neighbours: Vec<i32> = pairs.iter().map(|&(_, b)| b as i32).collect();
+        let neighbours: Vec<i32> = pairs.iter().map(|&pair| pair as u32 as i32).collect();
 
         let mut column_begin = vec![0];
         let mut rows = Vec::new();
