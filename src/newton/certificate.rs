@@ -51,6 +51,9 @@ use crate::vector::dot;
 const TURNS: usize = 4;
 /// It ends when perfect knowledge of `r` could lower the bound by no more than this share.
 const SHARP: f64 = 0.05;
+/// Or when the bound is so many times less than what is wanted, or what perfect knowledge of `r` could make of it so many times more:
+/// turns lowered that by 2.3 at most.
+const CLEAR: f64 = 5.0;
 /// Relative error of `rho'K^+ rho`: ten times what a factor in single precision may fail its probe by.
 const FACTORS: f64 = 0.01;
 /// Contact forces below this share of the largest, and forces out of balance below this share of all, are rounding.
@@ -125,12 +128,14 @@ impl Trial {
 }
 
 impl StepSolver<'_> {
-    /// Bounds `J(u) - min J` for an admissible `u`, by the multipliers of the last step and its factors. Collective.
+    /// Bounds `J(u) - min J` for an admissible `u`, by the multipliers of the last step and its factors: as sharply as it takes to see
+    /// whether the bound is what is `wanted`. Collective.
     pub fn certify(
         &mut self,
         problem: &TornProblem,
         (u, state): (&Torn, &State),
         lambda: &[f64],
+        wanted: Option<f64>,
         timer: &Timer,
     ) -> Certificate {
         // Admissible multipliers that balance the loads on every subdomain.
@@ -160,7 +165,8 @@ impl StepSolver<'_> {
             best.solves = solves;
             best.gap = best.gap.min(most);
             estimate = least;
-            if most - least <= SHARP * most || !least.is_finite() {
+            let is_clear = wanted.is_some_and(|wanted| CLEAR * best.gap <= wanted || least > CLEAR * wanted);
+            if most - least <= SHARP * most || is_clear || !least.is_finite() {
                 break;
             }
             // v = v + K^+ rho.

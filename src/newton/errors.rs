@@ -25,21 +25,24 @@ pub struct Errors {
 }
 
 impl StepSolver<'_> {
-    /// The errors of an admissible displacement with the multipliers of the last step. Collective.
+    /// The errors of an admissible displacement with the multipliers of the last step: that of the solver as sharply as it takes to
+    /// see whether it is this `share` of the other one, if that is all that is asked. Collective.
     pub fn errors(
         &mut self,
         problem: &TornProblem,
         (u, state): (&Torn, &State),
         lambda: &[f64],
+        share: Option<f64>,
         timer: &Timer,
     ) -> Errors {
-        let certificate = self.certify(problem, (u, state), lambda, timer);
         let Estimate { mut errors, stresses } =
             timer.time("error estimate", || estimate::estimate(problem.sums, &problem.regions(), u));
         let partial: Vec<f64> =
             errors.iter().zip(stresses).flat_map(|(errors, stress)| [errors.iter().sum(), stress]).collect();
         let sum = problem.space.sum(&partial, 2);
         let size = sum[1].sqrt().max(SIGNIFICANT * state.terms.energy.sqrt());
+        let wanted = share.map(|share| 0.5 * share * share * sum[0]);
+        let certificate = self.certify(problem, (u, state), lambda, wanted, timer);
         errors.iter_mut().flatten().for_each(|square| *square = relative(square.sqrt(), size));
         Errors {
             gap: certificate.gap,

@@ -312,7 +312,7 @@ impl<'a> Newton<'a> {
             return Some(Outcome::Converged);
         }
         if let Some(accuracy) = settings.accuracy {
-            let errors = solver.errors(problem, (&iterate.u, &iterate.state), &iterate.lambda, timer);
+            let errors = solver.errors(problem, (&iterate.u, &iterate.state), &iterate.lambda, Some(accuracy), timer);
             if errors.algebraic <= accuracy * errors.discretisation {
                 (iterate.errors, iterate.ended_by_accuracy) = (Some(errors), true);
                 return Some(Outcome::Converged);
@@ -334,7 +334,7 @@ impl<'a> Newton<'a> {
         let Self { problem, solver, iterate, .. } = self;
         let has_moved = self.steps.len() > self.before;
         if iterate.errors.is_none() && has_moved && iterate.state.energy.is_finite() {
-            iterate.errors = Some(solver.errors(problem, (&iterate.u, &iterate.state), &iterate.lambda, timer));
+            iterate.errors = Some(solver.errors(problem, (&iterate.u, &iterate.state), &iterate.lambda, None, timer));
         }
         if outcome == Outcome::Converged {
             self.iterate.energies = Some(timer.time("residuals", || self.energies()));

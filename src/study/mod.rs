@@ -14,7 +14,7 @@ mod limits;
 mod named;
 mod recorder;
 mod report;
-mod solver;
+pub(crate) mod solver;
 #[cfg(test)]
 mod tests;
 

@@ -22,7 +22,7 @@ use crate::sparse::cholesky::Precision;
 ///
 /// # Errors
 /// If supports, contacts and loads do not hold all bodies.
-pub(super) fn step_solver<'a>(
+pub(crate) fn step_solver<'a>(
     scene: &Scene,
     discrete: &'a Discrete,
     comm: &'a dyn Comm,
@@ -74,7 +74,7 @@ fn programs(scene: &Scene) -> ProgramSettings {
 const BALANCED: f64 = 0.03;
 
 /// When Newton's method stops.
-pub(super) fn settings(scene: &Scene) -> Settings {
+pub(crate) fn settings(scene: &Scene) -> Settings {
     let solver = &scene.solver;
     // An equilibrium is a lower bound of a limit load if it is one, wherever another one is that does the same work.
     let (tolerance, residual) = match &scene.limit {
