@@ -40,7 +40,7 @@ pub struct LimitLoad {
     pub lower: f64,
     /// From a mechanism: they do not bear more.
     pub upper: f64,
-    /// The factor at the last equilibrium: the best estimate, as it comes near the limit before mechanisms do.
+    /// The factor at the last equilibrium, at most `upper`: the best estimate, as it comes near the limit before mechanisms do.
     pub factor: f64,
     /// What loads of factor one do on the displacement there (energy).
     pub work: f64,
@@ -52,9 +52,10 @@ impl LimitLoad {
         (self.upper - self.lower) / self.upper.abs()
     }
 
-    /// From an equilibrium of this factor, whose residual may leave it above what the mechanism takes.
+    /// From an equilibrium of this factor: with its residual it may be above what the mechanism takes, without it is not.
     pub fn new(factor: f64, upper: f64, work: f64) -> Self {
-        Self { lower: factor.min(upper), upper, factor, work }
+        let factor = factor.min(upper);
+        Self { lower: factor, upper, factor, work }
     }
 
     /// With the higher lower bound of both, and the upper one of the later.
