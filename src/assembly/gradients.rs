@@ -21,7 +21,7 @@ struct Gradients<'a, F> {
 impl<F: FnMut(usize, [[f64; 3]; 3])> Visitor for Gradients<'_, F> {
     fn see<const N: usize, const P: usize>(&mut self, element: &Visited<N, P>) {
         let u = element.nodal(self.u);
-        for point in &element.points {
+        for point in element.points {
             let slope = |i: usize, j: usize| point.gradients.iter().zip(&u).map(|(g, u)| u[i] * g[j]).sum();
             (self.hand)(element.index, std::array::from_fn(|i| std::array::from_fn(|j| slope(i, j))));
         }

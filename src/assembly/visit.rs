@@ -14,7 +14,7 @@ pub struct Visited<'a, const N: usize, const P: usize> {
     /// Its nodes.
     pub nodes: &'a [u32; N],
     /// Its integration points.
-    pub points: [Point<N>; P],
+    pub points: &'a [Point<N>; P],
     /// Values of the shape functions at its points.
     pub values: &'a [[f64; N]; P],
 }
@@ -29,7 +29,7 @@ impl<const N: usize, const P: usize> Visited<'_, N, P> {
     /// Each point with its number in the subdomain.
     #[inline]
     pub fn points(&self) -> impl Iterator<Item = (usize, &Point<N>)> {
-        (P * self.index..).zip(&self.points)
+        (P * self.index..).zip(self.points)
     }
 }
 
@@ -58,7 +58,7 @@ fn show<E: Element<N, P>, const N: usize, const P: usize>(
     for (index, nodes) in elements.of::<N>().iter().enumerate() {
         let points = E::points(&nodes.map(|n| places[n as usize]));
         assert!(points.iter().all(|point| point.weight > 0.0), "elements of a checked mesh have volume");
-        visitor.see(&Visited { index, nodes, points, values });
+        visitor.see(&Visited { index, nodes, points: &points, values });
     }
 }
 
