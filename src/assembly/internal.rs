@@ -78,7 +78,7 @@ struct Forces<'a> {
 impl Visitor for Forces<'_> {
     fn see<const N: usize, const P: usize>(&mut self, element: &Visited<N, P>) {
         let u = element.nodal(self.u);
-        self.sum.terms.add(&element.points, self.modulus, &u);
+        self.sum.terms.add(element.points, self.modulus, &u);
         let mut plastic = false;
         let mut local = [[0.0; 3]; N];
         for (index, point) in element.points() {

@@ -37,5 +37,6 @@ mod rigid;
 mod ring;
 mod rubbing;
 mod rubbing_twins;
+mod stiffness;
 mod twins;
 mod verify;
