@@ -16,7 +16,7 @@ use crate::mesh::wholes::Wholes;
 /// Parts that an element may move to: the nearest ones of its own, with itself.
 const NEAREST: usize = 24;
 /// How often centres move with a sample of the elements, and with all of them.
-const ROUNDS: [usize; 2] = [100, 4];
+const ROUNDS: [usize; 2] = [48, 4];
 /// After so many rounds it is found anew which parts are near.
 const RENEWAL: usize = 8;
 /// How often weights are adapted between.
