@@ -40,7 +40,7 @@ pub struct LimitLoad {
     pub lower: f64,
     /// From a mechanism: they do not bear more.
     pub upper: f64,
-    /// The factor at the last equilibrium, at most `upper`: the best estimate, as it comes near the limit before mechanisms do.
+    /// The factor at the last equilibrium: the best estimate, as it comes near the limit before mechanisms do.
     pub factor: f64,
     /// What loads of factor one do on the displacement there (energy).
     pub work: f64,
@@ -52,10 +52,9 @@ impl LimitLoad {
         (self.upper - self.lower) / self.upper.abs()
     }
 
-    /// From an equilibrium of this factor: with its residual it may be above what the mechanism takes, without it is not.
+    /// From an equilibrium of this factor, whose residual may leave it above what the mechanism takes.
     pub fn new(factor: f64, upper: f64, work: f64) -> Self {
-        let factor = factor.min(upper);
-        Self { lower: factor, upper, factor, work }
+        Self { lower: factor.min(upper), upper, factor, work }
     }
 
     /// With the higher lower bound of both, and the upper one of the later.
