@@ -17,12 +17,17 @@ use crate::monitor::timing::Timer;
 use crate::newton::{ProgramSettings, Settings, StepSolver};
 use crate::scene::{self, Scene};
 use crate::sparse::cholesky::Precision;
+#[cfg(test)]
+use crate::{
+    decomposition::sums::NodeSums,
+    newton::{Begin, Newton, TornProblem},
+};
 
 /// The solver, before anything is factorised but the coarse problem. Collective.
 ///
 /// # Errors
 /// If supports, contacts and loads do not hold all bodies.
-pub(crate) fn step_solver<'a>(
+pub(super) fn step_solver<'a>(
     scene: &Scene,
     discrete: &'a Discrete,
     comm: &'a dyn Comm,
@@ -74,7 +79,7 @@ fn programs(scene: &Scene) -> ProgramSettings {
 const BALANCED: f64 = 0.03;
 
 /// When Newton's method stops.
-pub(crate) fn settings(scene: &Scene) -> Settings {
+pub(super) fn settings(scene: &Scene) -> Settings {
     let solver = &scene.solver;
     // An equilibrium is a lower bound of a limit load if it is one, wherever another one is that does the same work.
     let (tolerance, residual) = match &scene.limit {
@@ -87,4 +92,21 @@ pub(crate) fn settings(scene: &Scene) -> Settings {
         limit: solver.newton_limit,
         accuracy: solver.accuracy.filter(|_| scene.limit.is_none()),
     }
+}
+
+/// What is made of Newton's method at the beginning of a scene's only increment, for the tests of all rooms. Collective.
+#[cfg(test)]
+pub(crate) fn with_newton<T>(
+    scene: &Scene,
+    comm: &dyn Comm,
+    then: impl FnOnce(&mut Newton, &Discrete, &Timer) -> T,
+) -> T {
+    let timer = &Timer::start();
+    let discrete = &model::discretise(scene, comm).expect("the scene has a discrete problem");
+    let connection = Interconnection::new(comm, &discrete.decomposition, &discrete.constraints);
+    let sums = NodeSums::new(comm, &discrete.decomposition);
+    let (conditions, stages) = model::history::stages(scene, discrete, &|| connection.gather.zeros());
+    let solver = step_solver(scene, discrete, comm, &connection, &stages, timer).expect("the bodies are held");
+    let problem = TornProblem::new(discrete, &connection, &sums, conditions);
+    then(&mut Newton::new(problem, solver, settings(scene), (stages, None), Begin::Rest, timer), discrete, timer)
 }

@@ -2,13 +2,11 @@ use super::{CLEAR, TURNS};
 use crate::assembly::{Region, stress};
 use crate::comm::solo::Solo;
 use crate::comm::threads;
-use crate::decomposition::sums::NodeSums;
-use crate::feti::dual::Interconnection;
 use crate::fixture::{not_matching, two_bricks, two_meshes};
 use crate::material::Law;
 use crate::model;
 use crate::monitor::timing::Timer;
-use crate::newton::{Begin, Newton, TornProblem};
+use crate::newton::Newton;
 use crate::record::summary::Summary;
 use crate::scene::Scene;
 use crate::study::{self, solver};
@@ -137,25 +135,19 @@ fn the_gap_is_never_less_than_the_error() {
 #[test]
 fn a_bound_that_is_clearly_enough_or_clearly_not_takes_fewer_turns() {
     let scene = &two_bricks(&["load.top.traction=[0.0, 0.0, -0.35]", "support.right.displacement=[0.0, 0.0, 0.0]"]);
-    let (comm, timer) = (&Solo, &Timer::start());
-    let discrete = &model::discretise(scene, comm).expect("the scene has a discrete problem");
-    let connection = Interconnection::new(comm, &discrete.decomposition, &discrete.constraints);
-    let sums = NodeSums::new(comm, &discrete.decomposition);
-    let (conditions, stages) = model::history::stages(scene, discrete, &|| connection.gather.zeros());
-    let solver = solver::step_solver(scene, discrete, comm, &connection, &stages, timer).expect("the bodies are held");
-    let problem = TornProblem::new(discrete, &connection, &sums, conditions);
-    let mut newton = Newton::new(problem, solver, solver::settings(scene), (stages, None), Begin::Rest, timer);
-    newton.step(timer, &|_, _| {}).expect("it is a sound step");
-    let Newton { problem, solver, iterate, .. } = &mut newton;
-    let mut bound = |wanted| solver.certify(problem, (&iterate.u, &iterate.state), &iterate.lambda, wanted, timer);
-    let sharp = bound(None);
-    assert_eq!(sharp.solves, TURNS);
-    for wanted in [0.01 * sharp.gap, 10.0 * CLEAR * sharp.gap] {
-        let found = bound(Some(wanted));
-        assert!(found.solves < TURNS && found.is_bound && found.gap >= sharp.gap, "{wanted}: {found:?} {sharp:?}");
-        assert_eq!(found.gap <= wanted, sharp.gap <= wanted);
-    }
-    assert_eq!(bound(Some(sharp.gap)), sharp);
+    solver::with_newton(scene, &Solo, |newton, _, timer| {
+        newton.step(timer, &|_, _| {}).expect("it is a sound step");
+        let Newton { problem, solver, iterate, .. } = newton;
+        let mut bound = |wanted| solver.certify(problem, (&iterate.u, &iterate.state), &iterate.lambda, wanted, timer);
+        let sharp = bound(None);
+        assert_eq!(sharp.solves, TURNS);
+        for wanted in [0.01 * sharp.gap, 10.0 * CLEAR * sharp.gap] {
+            let found = bound(Some(wanted));
+            assert!(found.solves < TURNS && found.is_bound && found.gap >= sharp.gap, "{wanted}: {found:?} {sharp:?}");
+            assert_eq!(found.gap <= wanted, sharp.gap <= wanted);
+        }
+        assert_eq!(bound(Some(sharp.gap)), sharp);
+    });
 }
 
 /// Without hardening the stress is unique still, and the value an estimate that says so.

@@ -1,11 +1,10 @@
 use super::*;
 use crate::comm::solo::Solo;
 use crate::comm::threads;
-use crate::decomposition::sums::NodeSums;
 use crate::feti::dual::Interconnection;
 use crate::fixture::{RANKS, two_bricks};
 use crate::model;
-use crate::newton::{self, Begin, TornProblem};
+use crate::newton;
 use crate::study::solver;
 
 /// Quadratic tetrahedra, whose goal is this number, solved as exactly as can be.
@@ -28,27 +27,21 @@ fn bricks(goal: &str, sets: &[&str]) -> Scene {
 
 /// What is measured where a scene is solved: the row, the sum of the sizes again, and the work of the loads on the dual solution.
 fn measured(scene: &Scene, comm: &dyn Comm) -> (GoalRow, f64, f64) {
-    let timer = &Timer::start();
-    let discrete = &model::discretise(scene, comm).unwrap();
-    let connection = Interconnection::new(comm, &discrete.decomposition, &discrete.constraints);
-    let sums = NodeSums::new(comm, &discrete.decomposition);
-    let zeros = || connection.gather.zeros();
-    let (conditions, stages) = model::history::stages(scene, discrete, &zeros);
-    let solver = solver::step_solver(scene, discrete, comm, &connection, &stages, timer).unwrap();
-    let problem = TornProblem::new(discrete, &connection, &sums, conditions);
-    let mut newton = Newton::new(problem, solver, solver::settings(scene), (stages, None), Begin::Rest, timer);
-    while newton.outcome().is_none() {
-        newton.step(timer, &|_, _| {});
-    }
-    assert_eq!(newton.outcome(), Some(&newton::Outcome::Converged));
-    let mut goal = Goal::new(scene, discrete, comm, &zeros).unwrap().unwrap();
-    let (row, sizes) = goal.measure(&mut newton, timer).unwrap();
-    let dual = newton.response((&goal.forces, &goal.openings), 1e-3 * DROP, timer);
-    let problem = newton.problem();
-    let of = |own: usize| [sizes[own].iter().sum::<f64>(), dot(&problem.loads[own], &dual.v[own])];
-    let partial: Vec<[f64; 2]> = (0..sizes.len()).map(of).collect();
-    let sums = problem.space.sum(partial.as_flattened(), 2);
-    (row, sums[0], sums[1])
+    solver::with_newton(scene, comm, |newton, discrete, timer| {
+        while newton.outcome().is_none() {
+            newton.step(timer, &|_, _| {});
+        }
+        assert_eq!(newton.outcome(), Some(&newton::Outcome::Converged));
+        let gather = newton.problem().gather;
+        let mut goal = Goal::new(scene, discrete, comm, &|| gather.zeros()).unwrap().unwrap();
+        let (row, sizes) = goal.measure(newton, timer).unwrap();
+        let dual = newton.response((&goal.forces, &goal.openings), 1e-3 * DROP, timer);
+        let problem = newton.problem();
+        let of = |own: usize| [sizes[own].iter().sum::<f64>(), dot(&problem.loads[own], &dual.v[own])];
+        let partial: Vec<[f64; 2]> = (0..sizes.len()).map(of).collect();
+        let sums = problem.space.sum(partial.as_flattened(), 2);
+        (row, sums[0], sums[1])
+    })
 }
 
 const GOALS: [&str; 5] = [
