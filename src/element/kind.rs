@@ -129,7 +129,7 @@ impl Kind {
     /// A place of the [cell](Self::cell) of the element on these nodes, with a weight there.
     ///
     /// # Panics
-    /// If it has another number of nodes, or no volume.
+    /// If it has another number of nodes.
     pub fn sample(self, nodes: &[[f64; 3]], at: &[f64], weight: f64) -> Sample {
         by_kind!(self, E => E::sample(whole(nodes), at, weight))
     }

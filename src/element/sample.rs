@@ -22,7 +22,7 @@ pub const GAUSS: [(f64, f64); 3] =
 /// The points of an element with these nodes.
 ///
 /// # Panics
-/// If it has another number of nodes, or no volume.
+/// If it has another number of nodes.
 pub fn samples(kind: Kind, nodes: &[[f64; 3]]) -> Vec<Sample> {
     (0..27).map(|k| sample(kind, nodes, [GAUSS[k % 3], GAUSS[k / 3 % 3], GAUSS[k / 9]])).collect()
 }
