@@ -132,8 +132,7 @@ fn refinement_line(row: &RefinementRow, goal: f64) -> String {
 }
 
 fn limit_line(bounds: LimitLoad) -> String {
-    let LimitLoad { lower, upper, .. } = bounds;
-    format!("limit load factor between {lower:.6} and {upper:.6}, {:.2} % apart", 100.0 * bounds.width())
+    format!("limit load factor between {bounds}, {:.2} % apart", 100.0 * bounds.width())
 }
 
 fn newton_header() -> String {

@@ -33,6 +33,8 @@ use crate::vector::dot;
 
 /// The first work is that of [`strength`], on an elastic body, times this.
 const FIRST: f64 = 6.0;
+/// Loads are lowered before the first step if they are so many times what is wanted: their displacement is no more exact than that.
+const FAR: f64 = 100.0;
 /// A step leaves so much of the factor at least, but for the first, which chooses the work.
 const LEFT: f64 = 0.1;
 /// What tangents are of the elastic stiffness at least: a mechanism is not free then, and what holds it tells how far it goes.
@@ -45,6 +47,8 @@ pub const LONGEST: f64 = 64.0;
 pub struct Reach {
     /// `alpha` (energy); `None` until the first step has told a good one.
     pub work: Option<f64>,
+    /// What it is without `f_1`, as the first step told: overlaps and loads that stay may do as much, of any sign.
+    pub rest: f64,
     /// `zeta`.
     pub factor: f64,
     /// How often `alpha` was chosen.
@@ -54,9 +58,9 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Where loads of this factor do this work, if one is known.
-    pub fn at(work: Option<f64>, factor: f64) -> Self {
-        Self { work, factor, number: 1, upper: None }
+    /// Where loads of this factor do this work, if one is known, and without them the work of `rest`.
+    pub fn at(work: Option<f64>, rest: f64, factor: f64) -> Self {
+        Self { work, rest, factor, number: 1, upper: None }
     }
 }
 
@@ -76,7 +80,7 @@ impl Control {
     pub fn new(loads: &Torn, along: Torn, before: Option<Reach>) -> Self {
         let mut permanent = loads.clone();
         add(-1.0, &along, &mut permanent);
-        Self { permanent, along, reach: before.unwrap_or(Reach::at(None, 1.0)) }
+        Self { permanent, along, reach: before.unwrap_or(Reach::at(None, 0.0, 1.0)) }
     }
 
     /// `f_0 + zeta f_1`.
@@ -118,7 +122,8 @@ impl Control {
         state.energy -= change * before;
     }
 
-    /// Completes a step at `u` under the present loads, whose gradient was reduced by `drop`. Collective.
+    /// Completes a step at `u` under the present loads, whose gradient was reduced by `drop`. Returns whether it is one: if loads were much
+    /// too large, they are lowered with its multipliers, and it is to be solved again. Collective.
     ///
     /// # Errors
     /// The outcome of the iteration, if there is no response to go along.
@@ -129,7 +134,7 @@ impl Control {
         (u, state): (&Torn, &mut State),
         (step, drop): (&mut Step, f64),
         timer: &Timer,
-    ) -> Result<(), Outcome> {
+    ) -> Result<bool, Outcome> {
         let (directions, closed) = (take(&mut step.directions), vec![0.0; step.lambda.len()]);
         let Response { v, lambda, outcome, statistics, applications } =
             solver.response(problem, (&self.along, &closed), drop, directions, timer);
@@ -143,9 +148,16 @@ impl Control {
         let [compliance, before, added] = self.works(problem, [&v, u, &step.du])[..] else { unreachable!() };
         let (work, least) = match self.reach.work {
             Some(work) => (work, (LEFT - 1.0) * self.reach.factor),
-            // Where the body is without `f_1`, and from there; loads of the scene may be of any size.
+            // From where the body is without `f_1`; loads of the scene may be of any size.
             None => {
-                (before + added + (FIRST * strength(problem, &v) - self.reach.factor) * compliance, f64::NEG_INFINITY)
+                let (wanted, factor) = (FIRST * strength(problem, &v), self.reach.factor);
+                if FAR * wanted < factor {
+                    self.change(problem, wanted - factor, before, state);
+                    step.lambda.iter_mut().for_each(|l| *l *= wanted / factor);
+                    return Ok(false);
+                }
+                self.reach.rest = before + added - factor * compliance;
+                (self.reach.rest + wanted * compliance, f64::NEG_INFINITY)
             }
         };
         self.reach.work = Some(work);
@@ -160,7 +172,7 @@ impl Control {
         // Displacements need this change. Loads only tell where the next step goes from, and turned round they leave contacts unheld.
         self.change(problem, change.max(least), before, state);
         step.is_exact = false;
-        Ok(())
+        Ok(true)
     }
 }
 

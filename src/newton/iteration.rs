@@ -256,11 +256,12 @@ impl<'a> Newton<'a> {
             outcome => return Trial::Ended(Outcome::Inner(outcome)),
         }
         let drop = forcing.drop;
-        if let Some(control) = control
-            && let Err(outcome) =
-                control.steer(problem, solver, (&iterate.u, &mut iterate.state), (&mut step, drop), timer)
-        {
-            return Trial::Ended(outcome);
+        if let Some(control) = control {
+            match control.steer(problem, solver, (&iterate.u, &mut iterate.state), (&mut step, drop), timer) {
+                Ok(true) => {}
+                Ok(false) => return Trial::Refused(step),
+                Err(outcome) => return Trial::Ended(outcome),
+            }
         }
         // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
         let radii = problem.radii(&step.lambda);

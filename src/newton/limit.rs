@@ -26,6 +26,8 @@ pub struct Bounds {
     pub upper: f64,
     /// The work `alpha` (energy).
     pub work: f64,
+    /// The work without the loads that grow (energy).
+    pub rest: f64,
 }
 
 impl Newton<'_> {
@@ -41,19 +43,22 @@ impl Newton<'_> {
         let (control, problem) = (self.control.as_ref()?, &self.problem);
         let of_way = control.upper(problem, &self.iterate.u, self.mechanism());
         let upper = of_way.into_iter().chain(control.reach.upper).reduce(f64::min)?;
-        let (lower, work) = (control.reach.factor, control.reach.work?);
-        lower.is_finite().then_some(Bounds { lower, upper, work })
+        let (lower, work, rest) = (control.reach.factor, control.reach.work?, control.reach.rest);
+        lower.is_finite().then_some(Bounds { lower, upper, work, rest })
     }
 
-    /// Goes on from an equilibrium, along its mechanism, until that has done so many times the work. Collective.
+    /// Goes on from an equilibrium, along its mechanism, until that has done so many times the work. Since rest bodies also moved by what
+    /// others than the loads that grow did, so the way is no longer than the work is. Collective.
     pub fn press_on(&mut self, times: f64, timer: &Timer) {
         let v = self.mechanism();
         let Some(control) = &mut self.control else { return };
         let [before, along] = control.works(&self.problem, [&self.iterate.u, &v])[..] else { unreachable!() };
-        control.reach.work = Some(before + (times - 1.0) * along);
+        let done = if self.reached.is_some() { along } else { before - control.reach.rest };
+        control.reach.work = Some(before + (times - 1.0) * done);
         (control.reach.number, control.reach.upper) = (control.reach.number + 1, None);
+        let length = if along > 0.0 { (times - 1.0) * (done / along).min(1.0) } else { 0.0 };
         let mut u = self.iterate.u.clone();
-        add(times - 1.0, &v, &mut u);
+        add(length, &v, &mut u);
         self.problem.make_admissible(&mut u);
         let reached = Reached { u: self.iterate.u.clone(), lambda: self.iterate.lambda.clone() };
         self.begin(u, Some(&reached.lambda), timer);
@@ -66,7 +71,7 @@ impl Newton<'_> {
         let mut u = reached.as_ref().map_or_else(|| self.problem.gather.zeros(), |reached| reached.u.clone());
         self.problem.make_admissible(&mut u);
         let Some(control) = &mut self.control else { return };
-        let before = control.works(&self.problem, [&u])[0];
+        let before = reached.as_ref().map_or(control.reach.rest, |_| control.works(&self.problem, [&u])[0]);
         control.reach.work = control.reach.work.map(|work| before + share * (work - before));
         (control.reach.factor, control.reach.upper) = (factor, None);
         self.problem.loads = control.loads();

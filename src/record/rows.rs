@@ -1,5 +1,7 @@
 //! Rows of tables: one an increment, a Newton step, or a level of a cascade.
 
+use std::fmt::{self, Display, Formatter};
+
 use serde::{Deserialize, Serialize};
 
 use super::state::State;
@@ -44,22 +46,35 @@ pub struct LimitLoad {
     pub factor: f64,
     /// What loads of factor one do on the displacement there (energy).
     pub work: f64,
+    /// The same where they are not there, about: what loads that stay, overlaps and prescribed displacements make of it (energy).
+    pub rest: f64,
 }
 
 impl LimitLoad {
-    /// How far the bounds are apart, relative.
+    /// How far the bounds are apart, relative. Residuals may leave the lower one above what the mechanism takes.
     pub fn width(self) -> f64 {
-        (self.upper - self.lower) / self.upper.abs()
+        (self.upper - self.lower).abs() / self.upper.abs()
     }
 
-    /// From an equilibrium of this factor, whose residual may leave it above what the mechanism takes.
-    pub fn new(factor: f64, upper: f64, work: f64) -> Self {
-        Self { lower: factor.min(upper), upper, factor, work }
+    /// With the higher lower bound of both, and the upper one of the later, if the equilibrium before does not refute it: if it is not
+    /// below by more than this share.
+    pub fn then(self, later: Self, share: f64) -> Self {
+        let is_refuted = later.upper < self.lower - share * self.lower.abs();
+        let upper = if is_refuted { self.upper } else { later.upper };
+        Self { lower: self.lower.max(later.lower), upper, ..later }
     }
 
-    /// With the higher lower bound of both, and the upper one of the later.
-    pub fn then(self, later: Self) -> Self {
-        Self { lower: self.lower.max(later.lower).min(later.upper), ..later }
+    /// With bounds that do not overlap.
+    pub fn in_order(self) -> Self {
+        Self { lower: self.lower.min(self.upper), ..self }
+    }
+}
+
+/// Both bounds with seven digits, of loads of any size.
+impl Display for LimitLoad {
+    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
+        let [lower, upper] = [self.lower, self.upper].map(|bound| format!("{bound:.6e}").parse().unwrap_or(bound));
+        write!(f, "{lower} and {upper}")
     }
 }
 
@@ -164,4 +179,35 @@ pub struct CascadeRow {
     pub factorisations: Option<u64>,
     /// Wall time in seconds.
     pub seconds: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equilibria_refute_mechanisms_that_end_below_them() {
+        let of = |lower: f64, upper: f64| LimitLoad { lower, upper, factor: lower, work: 1.0, rest: 0.0 };
+        let bounds = |limit: LimitLoad| [limit.lower, limit.upper];
+        let before = of(1.2, 1.5);
+        assert_eq!(bounds(before.then(of(1.25, 1.3), 0.01)), [1.25, 1.3]);
+        // Less work, and a mechanism that takes more.
+        assert_eq!(bounds(before.then(of(1.1, 1.6), 0.01)), [1.2, 1.6]);
+        assert_eq!(bounds(before.then(of(1.1, 1.15), 0.01)), [1.2, 1.5]);
+        // Residuals leave a little.
+        let near = before.then(of(1.1, 1.195), 0.01);
+        assert_eq!(bounds(near), [1.2, 1.195]);
+        assert!(near.width() < 0.005 && bounds(near.in_order()) == [1.195, 1.195]);
+        // Loads that stay may bear more than all by themselves.
+        let negative = of(-1.2, -0.9);
+        assert_eq!(bounds(negative.then(of(-1.1, -1.3), 0.01)), [-1.1, -0.9]);
+        assert!(of(-1.3, -1.0).width() > 0.2);
+    }
+
+    #[test]
+    fn bounds_of_any_size_are_told_with_seven_digits() {
+        let told =
+            LimitLoad { lower: 1.234567891e-6, upper: 123456.7891, factor: 1.0, work: 1.0, rest: 0.0 }.to_string();
+        assert_eq!(told, "0.000001234568 and 123456.8");
+    }
 }

@@ -45,11 +45,11 @@ pub(super) fn seek(
             return Ok((Some((at, outcome)), found));
         }
         let Some(row) = recorder.rows.last().and_then(|row| row.limit_load) else { return Ok((None, None)) };
-        let best = found.map_or(row, |best| best.then(row));
+        let best = found.map_or(row, |best| best.then(row, limit.tolerance));
         watcher.tell(Event::Limit(best));
         found = Some(best);
         if best.width() <= limit.tolerance {
-            return Ok((None, found));
+            return Ok((None, Some(best.in_order())));
         }
         if at.number as u64 == MOST {
             return Ok((Some((at, Outcome::Unlimited)), found));

@@ -188,7 +188,7 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
                 u = problem.gather.zeros();
                 problem.make_admissible(&mut u);
             }
-            let reach = limit.map(|limit| Reach::at(Some(limit.work), limit.factor));
+            let reach = limit.map(|limit| Reach::at(Some(limit.work), limit.rest, limit.factor));
             newton::Begin::Near(newton::Start { u, kept, is_origin: false, reach })
         }
         Begin::After(Earlier { committed, u, .. }) => {

@@ -55,7 +55,13 @@ pub(super) fn step_row(
         time: at.time(),
         halvings: at.halvings as u64,
         converged,
-        limit_load: bounds.map(|newton::Bounds { lower, upper, work }| LimitLoad::new(lower, upper, work)),
+        limit_load: bounds.map(|newton::Bounds { lower, upper, work, rest }| LimitLoad {
+            lower,
+            upper,
+            factor: lower,
+            work,
+            rest,
+        }),
         goal: None,
         consistency: None,
         state: State { measures, ..state(scene, discrete, newton, contact, von_mises) },
@@ -177,8 +183,7 @@ pub(super) fn summarise(
         let mut message = outcome.message()?;
         if scene.limit.is_some() {
             let found = rows.iter().rev().find_map(|row| row.limit_load);
-            let found =
-                found.map(|LimitLoad { lower, upper, .. }| format!("; the last bounds are {lower:.6} and {upper:.6}"));
+            let found = found.map(|bounds| format!("; the last bounds are {bounds}"));
             return Some(message + &found.unwrap_or_default());
         }
         if scene.has_limit_load() && !scene.load.is_empty() {

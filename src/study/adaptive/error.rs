@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn energies_of_other_works_are_not_compared() {
-        let limit = |work: f64| Some(LimitLoad { lower: 1.0, upper: 1.0, factor: 1.0, work });
+        let limit = |work: f64| Some(LimitLoad { lower: 1.0, upper: 1.0, factor: 1.0, work, rest: 0.0 });
         let row = |energy, distance, work| RefinementRow { limit_load: limit(work), ..known(energy, distance) };
         let [coarse, other, fine] = [row(14.0, 4.0, 1.0), row(100.0, 8.0, 2.0), row(8.0, 1.0, 1.0)];
         let alone = estimate(&ErrorOf::Energy, &[coarse.clone(), fine.clone()]);
