@@ -22,6 +22,7 @@ mod exactness;
 use std::ops::ControlFlow;
 
 use self::exactness::{Exactness, LEAST, LOOSE};
+use super::inside::Inside;
 use super::pcpg::{Directions, Pcpg};
 use super::quadratic::{Quadratic, Space};
 use super::slides::Slides;
@@ -156,9 +157,10 @@ impl Run<'_> {
             self.move_to(face, &mut wish);
             self.statistics.sets += 1;
             let goal = *target.get_or_insert_with(|| {
-                self.first_norm = self.projected_norm(face);
-                floor = Limits { drop: 0.0, ..*limits }.target(self.first_norm);
-                limits.target(self.first_norm)
+                let inside = Inside::of(self.space, face, &self.residual);
+                self.first_norm = inside.norm();
+                floor = Limits { drop: 0.0, ..*limits }.target(self.first_norm).max(inside.noise);
+                limits.target(self.first_norm).max(inside.noise)
             });
             self.waiting = if goal > floor { WAITING * self.few } else { 0.0 };
             let relative = exactness.take_relative();
@@ -210,7 +212,6 @@ impl Run<'_> {
         for_ever: bool,
         limits: &Limits,
     ) -> ControlFlow<Outcome, Change> {
-        let goal = limits.absolute;
         loop {
             let limits = Limits { products: limits.products.saturating_sub(self.statistics.hessian), ..*limits };
             let report = solver.solve(face, &mut self.x, &mut self.residual, &limits);
@@ -218,6 +219,7 @@ impl Run<'_> {
             if report.outcome != Outcome::Converged {
                 return ControlFlow::Break(report.outcome);
             }
+            let goal = limits.absolute.max(report.noise);
             match self.correct(face, goal, report.norm, for_ever) {
                 Correction::None if report.norm <= goal => return ControlFlow::Break(Outcome::Converged),
                 Correction::None => {}
@@ -252,12 +254,6 @@ impl Run<'_> {
         self.statistics.hessian += 1;
         axpy(-1.0, &self.image, &mut self.residual);
         self.x.copy_from_slice(wish);
-    }
-
-    fn projected_norm(&mut self, face: &mut dyn Face) -> f64 {
-        self.work.copy_from_slice(&self.residual);
-        face.reduce(&mut self.work);
-        self.space.norm(&self.work)
     }
 
     /// Lets rows of negative force go and takes rows of violated gap in, and corrects discs. Very few rows, and no disc besides, wait until

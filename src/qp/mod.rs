@@ -16,6 +16,7 @@
 pub mod active_set;
 pub mod discs;
 pub mod feasible;
+pub mod inside;
 pub mod mprgp;
 pub mod pcpg;
 pub mod power;

@@ -13,6 +13,7 @@
 //! new direction takes away. Where that is all there is left, the next direction is rounding. It shows, as p'P'r is
 //! r'P M P'r otherwise, and x goes to the minimum along the kept directions once more.
 
+use super::inside::Inside;
 use super::quadratic::{Quadratic, Space};
 use super::{Limits, Outcome, Statistics};
 use crate::vector::axpy;
@@ -34,6 +35,8 @@ pub struct Report {
     pub first_norm: f64,
     /// Norm of P'r at the end.
     pub norm: f64,
+    /// A norm that is nothing but rounding.
+    pub noise: f64,
 }
 
 /// Where p'P'r is below this share of r'P M P'r, the residual lies along kept directions.
@@ -44,35 +47,6 @@ struct Direction {
     p: Vec<f64>,
     ap: Vec<f64>,
     curvature: f64,
-}
-
-/// The projected residual, carried on by recurrences.
-struct Inside {
-    /// P'r.
-    residual: Vec<f64>,
-    /// Its squared norm; the recurrence rounds relative to where it began.
-    square: f64,
-    /// The squared norm when it was measured last.
-    measured: f64,
-}
-
-impl Inside {
-    /// Projects and measures a residual.
-    fn of(space: &dyn Space, function: &mut dyn Quadratic, residual: &[f64]) -> Self {
-        let mut residual = residual.to_vec();
-        function.reduce(&mut residual);
-        let square = space.dot(&residual, &residual);
-        Self { residual, square, measured: square }
-    }
-
-    /// Takes `step` times `P'A p` away, given its squared norm and its product with the residual.
-    fn advance(&mut self, step: f64, projected: &[f64], [square_ap, change]: [f64; 2]) {
-        axpy(-step, projected, &mut self.residual);
-        self.square += step * (step * square_ap - 2.0 * change);
-        if self.square < 0.0 {
-            self.square = 0.0;
-        }
-    }
 }
 
 /// Directions that are A-orthogonal to each other, with their products.
@@ -126,20 +100,20 @@ impl<'a> Pcpg<'a> {
     ) -> Report {
         let mut statistics = Statistics::default();
         let mut inside = Inside::of(self.space, function, residual);
-        let first_norm = inside.square.sqrt();
+        let first_norm = inside.norm();
         let mut has_descended = false;
         loop {
             // Stopping tests by |P'r|, which is measured before it is believed.
-            let norm = inside.square.sqrt();
-            let report = |outcome, statistics| Report { outcome, statistics, first_norm, norm };
+            let (norm, noise) = (inside.norm(), inside.noise);
+            let report = |outcome, statistics| Report { outcome, statistics, first_norm, norm, noise };
             if !norm.is_finite() {
                 return report(Outcome::NotFinite, statistics);
             }
-            let small = norm <= limits.target(first_norm);
-            if small && inside.square == inside.measured {
+            let small = norm <= limits.target(first_norm).max(noise);
+            if small && inside.is_measured() {
                 return report(Outcome::Converged, statistics);
             }
-            if small || inside.square < REFRESH * inside.measured {
+            if small || inside.has_dropped(REFRESH) {
                 inside = Inside::of(self.space, function, residual);
                 continue;
             }

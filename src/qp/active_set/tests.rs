@@ -72,6 +72,25 @@ fn any_start_gives_the_same_and_the_solution_costs_nothing() {
 }
 
 #[test]
+fn rounding_of_a_projection_is_no_direction() {
+    let mut torn = Torn::membrane(3, 5);
+    torn.preconditioned = true;
+    let n = torn.d.len();
+    let exact = Limits { relative: 1e-15, ..LIMITS };
+    let first = from(&mut torn, vec![0.0; n], vec![true; n], &LIMITS);
+    let near = from(&mut torn, first.x, first.kept, &exact);
+    // Without a reference the tolerance is a share of what is rounding already.
+    let again = from(&mut torn, near.x.clone(), near.kept, &exact);
+    assert_eq!(again.outcome, Outcome::Converged);
+    assert!(
+        again.first_norm < 1e-12 * dot(&torn.d, &torn.d).sqrt() && again.statistics.hessian <= 2,
+        "{:?}",
+        again.statistics
+    );
+    assert!(distance(&near.x, &again.x) < 1e-12 * dot(&near.x, &near.x).sqrt());
+}
+
+#[test]
 fn few_rows_may_be_astray_unless_the_tolerance_is_the_last() {
     let mut torn = Torn::membrane(4, 6);
     let n = torn.d.len();
