@@ -17,7 +17,7 @@ use crate::results::provenance::{COMMIT, VERSION};
 use crate::results::replace::{self, Form};
 
 /// What checkpoints are written by; others are not understood.
-pub(super) const FORMAT: &str = "fetiplast checkpoint 5";
+pub(super) const FORMAT: &str = "fetiplast checkpoint 6";
 
 /// What a run has to do; a checkpoint says what is left.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -34,6 +34,9 @@ pub(super) struct Plan {
     /// Meshes that were solved on before, where the scene asks for an error.
     #[serde(default)]
     pub refinements: Vec<RefinementRow>,
+    /// Whether the present mesh is solved on again, as it is the last one: bounds of a limit load have to be near only there.
+    #[serde(default)]
+    pub again: bool,
 }
 
 impl Plan {

@@ -6,6 +6,7 @@ use super::levels::{Run, unfit};
 use super::plan::Plan;
 use super::room::make_room;
 use super::{Failure, is_chosen};
+use crate::feti::Torn;
 use crate::mesh::SolidMesh;
 use crate::mesh::quality::Quality;
 use crate::model::meshes::Meshes;
@@ -16,7 +17,7 @@ use crate::record::rows::RefinementRow;
 use crate::record::state::State;
 use crate::restart::checkpoint::Unfit;
 use crate::results::checkpoint::Checkpoint;
-use crate::scene::{ErrorOf, Scene};
+use crate::scene::{ErrorOf, Limit, Scene};
 use crate::sizing::counts::Counted;
 use crate::study::adaptive::aim::shares;
 use crate::study::adaptive::error::{estimate, is_history, is_known, vanishes};
@@ -28,6 +29,16 @@ use crate::study::{Begin, Solved};
 const MOST: usize = 40;
 /// The first mesh is enough if its error is so many times smaller than wanted: nothing was compared yet.
 const CLEARLY: f64 = 100.0;
+/// How far bounds of a limit load may be apart on meshes between the first one, which chooses the work, and the last.
+const ROUGH: f64 = 0.05;
+
+/// What to solve on.
+enum On {
+    /// Other meshes.
+    Meshes(Meshes),
+    /// The same ones again, from the displacement that is known there.
+    Same(Box<Discrete>, Torn),
+}
 
 impl Run<'_> {
     /// Solves mesh after mesh, from where a checkpoint stands if there is one. What goes wrong on a finer mesh leaves the result
@@ -41,12 +52,13 @@ impl Run<'_> {
     ) -> Result<(Discrete, Solved), Failure> {
         let start = start(scene, |name| is_chosen(&plan.source, name)).map_err(Failure::Scene)?;
         start.notes.iter().for_each(|note| monitor.event(&Event::Note(note.clone())));
-        let (mut adaptive, mut meshes) = self.first_meshes(&start, &checkpoint, plan.refinements.len(), monitor)?;
+        let refinements = plan.refinements.len() - usize::from(plan.again);
+        let (mut adaptive, meshes) = self.first_meshes(&start, &checkpoint, refinements, monitor)?;
         let (scene, goal) = (&start.scene, start.scene.solver.error.unwrap_or_default());
-        let mut before = None;
+        let (mut before, mut next) = (None, On::Meshes(meshes));
         loop {
             let began = self.timer.total_seconds();
-            let found = self.on_mesh(plan, scene, (&adaptive, meshes), checkpoint.take(), monitor);
+            let found = self.on(plan, scene, (&adaptive, next), checkpoint.take(), monitor);
             let (discrete, solved) = match (found, before.take()) {
                 (Ok(found), _) if found.1.summary.converged == Some(true) => found,
                 (Ok((_, failed)), Some(before)) => {
@@ -57,32 +69,32 @@ impl Run<'_> {
                 }
                 (found, _) => return found,
             };
+            let is_rough = scene.limit.is_some() && !plan.again && !plan.refinements.is_empty();
             let increments = counting(&solved.summary, plan.refinements.is_empty());
-            plan.refinements.push(self.row((&discrete, &solved), &increments, adaptive.unknowns(), began));
-            let row = with_error(plan, &scene.solver.error_of);
+            let row = self.row((&discrete, &solved), &increments, adaptive.unknowns(), began);
+            let row = with_error(plan, row, &scene.solver.error_of);
             monitor.event(&Event::Refinement { row: row.clone(), goal });
             if row.goal.is_some_and(|number| vanishes(&number)) {
-                return Ok(given_up(
-                    (discrete, solved),
-                    plan,
-                    goal,
-                    "the number is zero, and errors are relative to it",
-                ));
+                const NOTHING: &str = "the number is zero, and errors are relative to it";
+                return Ok(given_up((discrete, solved), plan, goal, NOTHING));
             }
             let (error, is_known) = (row.error, is_known(&scene.solver.error_of, &plan.refinements));
-            if error <= goal && (is_known || error * CLEARLY <= goal) {
-                return Ok((discrete, solved));
-            }
+            let is_enough = error <= goal && (is_known || error * CLEARLY <= goal);
             let finer = || self.finer(scene, &adaptive, (&discrete, &solved), &increments, plan);
-            match self.timer.time("refinement of the mesh", finer) {
-                Ok(finer) => {
-                    let tight;
+            let finer = (!is_enough).then(|| self.timer.time("refinement of the mesh", finer));
+            match finer {
+                Some(Ok(finer)) => {
+                    let (meshes, tight);
                     (adaptive, meshes, tight) = finer;
                     tight.into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
-                    before = Some((discrete, solved));
+                    (before, next, plan.again) = (Some((discrete, solved)), On::Meshes(meshes), false);
                 }
-                Err(_) if error <= goal => return Ok((discrete, solved)),
-                Err(limit) => return Ok(given_up((discrete, solved), plan, goal, &limit)),
+                _ if is_rough => {
+                    monitor.event(&Event::Note("bounds of the limit load on this mesh".into()));
+                    (next, plan.again) = (On::Same(Box::new(discrete), solved.u), true);
+                }
+                Some(Err(limit)) if error > goal => return Ok(given_up((discrete, solved), plan, goal, &limit)),
+                _ => return Ok((discrete, solved)),
             }
         }
     }
@@ -110,23 +122,31 @@ impl Run<'_> {
         Ok((adaptive, meshes))
     }
 
-    /// Solves on the meshes that there are, near the displacement that these have. Collective.
-    fn on_mesh(
+    /// Solves on meshes, near the displacement that these have. Collective.
+    fn on(
         &self,
         plan: &Plan,
         scene: &Scene,
-        (adaptive, meshes): (&Adaptive, Meshes),
+        (adaptive, on): (&Adaptive, On),
         checkpoint: Option<Checkpoint>,
         monitor: &mut Monitor,
     ) -> Result<(Discrete, Solved), Failure> {
         let (comm, timer) = (self.comm, self.timer);
-        let discrete = timer.time("discretisation", || model::discretise_meshes(scene, meshes, None, comm))?;
-        let begin = match checkpoint {
-            Some(file) => self.at(&discrete, file, monitor)?,
-            None if plan.refinements.is_empty() || is_history(&plan.refinements) => Begin::Rest,
-            None => {
-                let limit = plan.refinements.last().and_then(|row| row.limit_load);
-                Begin::Around(timer.time("interpolation", || adaptive.displacement(comm, &discrete)), limit)
+        let limit = plan.refinements.last().and_then(|row| row.limit_load);
+        let is_between = !plan.refinements.is_empty() && !plan.again;
+        let scene = if is_between { &rough(scene) } else { scene };
+        let (discrete, begin) = match on {
+            On::Same(discrete, u) => (*discrete, Begin::Around(u, limit)),
+            On::Meshes(meshes) => {
+                let discrete = timer.time("discretisation", || model::discretise_meshes(scene, meshes, None, comm))?;
+                let begin = match checkpoint {
+                    Some(file) => self.at(&discrete, file, monitor)?,
+                    None if plan.refinements.is_empty() || is_history(&plan.refinements) => Begin::Rest,
+                    None => {
+                        Begin::Around(timer.time("interpolation", || adaptive.displacement(comm, &discrete)), limit)
+                    }
+                };
+                (discrete, begin)
             }
         };
         self.solve_problem(plan, scene, (discrete, adaptive.arrays()), begin, monitor)
@@ -225,8 +245,21 @@ impl Run<'_> {
     }
 }
 
-/// The row of the last mesh, with its error.
-fn with_error(plan: &mut Plan, of: &ErrorOf) -> RefinementRow {
+/// The scene as it is solved on meshes between the first and the last one.
+fn rough(scene: &Scene) -> Scene {
+    let limit = scene.limit.as_ref().map(|limit| Limit { tolerance: limit.tolerance.max(ROUGH), ..limit.clone() });
+    Scene { limit, ..scene.clone() }
+}
+
+/// Takes the row of the last mesh down, and returns it with its error. If that was solved on before it counts as well.
+fn with_error(plan: &mut Plan, mut row: RefinementRow, of: &ErrorOf) -> RefinementRow {
+    if let Some(rough) = plan.refinements.pop_if(|_| plan.again) {
+        let sum = |a: Option<u64>, b: Option<u64>| a.zip(b).map(|(a, b)| a + b);
+        row.newton_iterations = sum(row.newton_iterations, rough.newton_iterations);
+        row.hessian_multiplications = sum(row.hessian_multiplications, rough.hessian_multiplications);
+        row.seconds += rough.seconds;
+    }
+    plan.refinements.push(row);
     // Files have no infinite numbers.
     let error = estimate(of, &plan.refinements).min(f64::MAX);
     let row = plan.refinements.last_mut().expect("a mesh was solved on");

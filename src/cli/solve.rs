@@ -104,7 +104,7 @@ pub fn solve(arguments: Solve, comm: &dyn Comm, signals: Signals) -> Result<i32,
     let scene = found.at_level(source.level, &source.sets)?;
     let mut levels = cascade.before(source.level, &scene);
     levels.push(source.level);
-    let plan = Plan { source, levels, yielding: None, rows: Vec::new(), refinements: Vec::new() };
+    let plan = Plan { source, levels, yielding: None, rows: Vec::new(), refinements: Vec::new(), again: false };
     carry_out(plan, &found, &scene, None, Setting { timer, out, conduct, signals }, comm)
 }
 

@@ -106,14 +106,14 @@ impl<'a> Newton<'a> {
             }
         };
         Conditions { loads: problem.loads, rhs: problem.rhs, friction: problem.friction } = path.conditions(attempt);
+        let is_made = reach.is_some_and(|reach| reach.work.is_some());
         let control = along.map(|along| Control::new(&problem.loads, along, reach));
         if let Some(control) = &control {
             (problem.loads, problem.firm) = (control.loads(), firm(&problem.materials));
         }
         let (iterate, outcome) = iterate::first(&problem, &mut solver, (u, lambda), kept, stood, timer);
-        // A limit load's equilibria but the first begin at displacements that are made admissible.
-        let was_made = before < steps.len() || (control.is_some() && !steps.is_empty());
-        let admissible = was_made || problem.is_admissible(&iterate.u);
+        // Where the work is chosen, displacements are made admissible.
+        let admissible = before < steps.len() || is_made || problem.is_admissible(&iterate.u);
         Self {
             problem,
             solver,

@@ -183,11 +183,6 @@ fn enter(begin: Begin, problem: &mut TornProblem, recorder: &mut Recorder) -> ne
             problem.make_admissible(&mut u);
             let largest = problem.space.maximum(newton::residuals::largest_displacement(&u));
             let kept = problem.laws().kept_at(&problem.slack(&u), ROUNDING * largest);
-            // Flowing bodies hardly resist what interpolation leaves open, and contacts part: those are found again from rest.
-            if limit.is_some() && problem.constraints.has_inequalities {
-                u = problem.gather.zeros();
-                problem.make_admissible(&mut u);
-            }
             let reach = limit.map(|limit| Reach::at(Some(limit.work), limit.rest, limit.factor));
             newton::Begin::Near(newton::Start { u, kept, is_origin: false, reach })
         }

@@ -284,6 +284,43 @@ fn meshes_are_refined_to_a_limit() {
     }
 }
 
+/// Blocks that are refined to a limit: only the last mesh is solved on to near bounds, from where it stood. A run that is stopped on the way
+/// there, in that, or on a mesh before goes on with the same bits.
+#[test]
+fn meshes_between_the_first_and_the_last_have_wide_bounds() {
+    let sets = [
+        "body.lower.brick.cells=[6, 2, 2]",
+        "body.upper.brick.cells=[6, 2, 2]",
+        "material.lower.hardening=0",
+        "material.upper.hardening=0",
+        "decomposition.subdomains=4",
+        "solver.error=0.1",
+        "limit.tolerance=0.001",
+    ];
+    let directory = tempfile::tempdir().unwrap();
+    let (whole, out) = (directory.path().join("whole"), directory.path().join("stopped"));
+    let end = run_briefly(1, &crate::checkpoint::solve(&whole, &sets, &[]));
+    assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+    let summary: Value =
+        serde_json::from_str(&std::fs::read_to_string(whole.join("two-blocks.json")).unwrap()).unwrap();
+    bounds(&summary, 0.001);
+    let rows = summary["refinements"].as_array().unwrap();
+    let steps = |row: &Value| number(row, "newton_iterations") as usize;
+    let [before, all] = [rows.len() - 1, rows.len()].map(|meshes| rows[..meshes].iter().map(steps).sum::<usize>());
+    let again = newton(&whole).len();
+    assert!(rows.len() > 2 && again + 2 < all - before, "{again} of {before} to {all}");
+    let wide = rows[1..].iter().map(|row| {
+        let [lower, upper] = ["lower", "upper"].map(|key| number(&row["limit_load"], key));
+        (upper - lower) / upper
+    });
+    assert!(wide.clone().any(|width| width > 0.001), "{:?}", wide.collect::<Vec<_>>());
+    for (steps, ranks) in [(before - 1, 2), (before + 2, 3), (all - again, 3), (all - 1, 2)] {
+        let end = resume_with(ranks, &stopped_after(steps, &out, &sets), &[]);
+        assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
+        assert_same_result(&out, &whole, "two-blocks");
+    }
+}
+
 #[test]
 fn the_command_line_asks_for_a_limit_too() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/precision/limit-sphere.toml");
