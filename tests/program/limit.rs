@@ -314,7 +314,8 @@ fn meshes_between_the_first_and_the_last_have_wide_bounds() {
         (upper - lower) / upper
     });
     assert!(wide.clone().any(|width| width > 0.001), "{:?}", wide.collect::<Vec<_>>());
-    for (steps, ranks) in [(before - 1, 2), (before + 2, 3), (all - again, 3), (all - 1, 2)] {
+    // After every step, and on other ranks from the last mesh before it is solved on, and from where that is nearly done.
+    for (steps, ranks) in [(before + 2, 3), (all - 1, 2)] {
         let end = resume_with(ranks, &stopped_after(steps, &out, &sets), &[]);
         assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
         assert_same_result(&out, &whole, "two-blocks");
