@@ -28,7 +28,6 @@ use crate::assembly::dissipation;
 use crate::feti::Torn;
 use crate::material::{Law, Material};
 use crate::monitor::timing::Timer;
-use crate::qp;
 use crate::vector::dot;
 
 /// The first work is that of [`strength`], on an elastic body, times this.
@@ -140,11 +139,7 @@ impl Control {
             solver.response(problem, (&self.along, &closed), drop, directions, timer);
         step.statistics += statistics;
         step.applications += applications;
-        match outcome {
-            qp::Outcome::Converged | qp::Outcome::LimitReached => {}
-            qp::Outcome::NotFinite => return Err(Outcome::NotFinite),
-            outcome => return Err(Outcome::Inner(outcome)),
-        }
+        Outcome::of_program(outcome)?;
         let [compliance, before, added] = self.works(problem, [&v, u, &step.du])[..] else { unreachable!() };
         let (work, least) = match self.reach.work {
             Some(work) => (work, (LEFT - 1.0) * self.reach.factor),

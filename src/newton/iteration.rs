@@ -5,6 +5,7 @@
 //! [`Newton::snapshot`] has all that the rest depends on.
 
 use std::mem::{replace, take};
+use std::ops::ControlFlow::{self, Break, Continue};
 
 use super::control::{Control, LONGEST, firm};
 use super::damping::{self, Damped};
@@ -227,42 +228,11 @@ impl<'a> Newton<'a> {
 
     /// Tries a step: solves the quadratic program of the tangents at the iterate, and looks for a length that lowers `J`.
     fn trial(&mut self, refused: &[Step], timer: &Timer, alive: &dyn Fn(usize, usize)) -> Trial {
-        let Self { problem, solver, iterate, forcing, steps, control, .. } = self;
-        let own = &steps[self.before..];
-        // Where rounding spoiled the last step factors have to be in double precision.
-        if own.last().is_some_and(|(_, step)| step.is_spoiled()) {
-            solver.sharpen();
-        }
-        let goes_on = self.settings.accuracy.is_none();
-        if problem.is_linear() && goes_on {
-            forcing.drop = solver.linear_drop();
-        }
-        let number = own.len() + 1;
-        let at = (&iterate.u, &iterate.state);
-        let last = refused.last().map_or(&iterate.lambda, |trial| &trial.lambda);
-        let mut step = match solver
-            .solve(problem, at, last, (*forcing, goes_on), timer, &|applications| alive(number, applications))
-        {
-            Ok(step) => step,
-            Err(message) => return Trial::Ended(Outcome::Singular(message)),
+        let step = match self.program(refused, timer, alive) {
+            Continue(step) => step,
+            Break(trial) => return trial,
         };
-        // Perhaps the factors were not exact enough.
-        if step.outcome != qp::Outcome::Converged && solver.sharpen() {
-            return Trial::Refused(step);
-        }
-        match step.outcome {
-            qp::Outcome::Converged | qp::Outcome::LimitReached => {}
-            qp::Outcome::NotFinite => return Trial::Ended(Outcome::NotFinite),
-            outcome => return Trial::Ended(Outcome::Inner(outcome)),
-        }
-        let drop = forcing.drop;
-        if let Some(control) = control {
-            match control.steer(problem, solver, (&iterate.u, &mut iterate.state), (&mut step, drop), timer) {
-                Ok(true) => {}
-                Ok(false) => return Trial::Refused(step),
-                Err(outcome) => return Trial::Ended(outcome),
-            }
-        }
+        let Self { problem, solver, iterate, forcing, control, .. } = self;
         // Inadmissible starts (prescribed displacements, overlaps) have no energy to compare with.
         let radii = problem.radii(&step.lambda);
         let longest = if control.is_some() { LONGEST } else { 1.0 };
@@ -285,6 +255,42 @@ impl<'a> Newton<'a> {
                 solver.sharpen();
                 Trial::Refused(step)
             }
+        }
+    }
+
+    /// The step by the quadratic program of a trial, with loads that follow their work; or how the trial ended with it.
+    fn program(&mut self, refused: &[Step], timer: &Timer, alive: &dyn Fn(usize, usize)) -> ControlFlow<Trial, Step> {
+        let Self { problem, solver, iterate, forcing, steps, control, .. } = self;
+        let own = &steps[self.before..];
+        // Where rounding spoiled the last step factors have to be in double precision.
+        if own.last().is_some_and(|(_, step)| step.is_spoiled()) {
+            solver.sharpen();
+        }
+        let goes_on = self.settings.accuracy.is_none();
+        if problem.is_linear() && goes_on {
+            forcing.drop = solver.linear_drop();
+        }
+        let number = own.len() + 1;
+        let at = (&iterate.u, &iterate.state);
+        let last = refused.last().map_or(&iterate.lambda, |trial| &trial.lambda);
+        let alive = |applications: usize| alive(number, applications);
+        let mut step = match solver.solve(problem, at, last, (*forcing, goes_on), timer, &alive) {
+            Ok(step) => step,
+            Err(message) => return Break(Trial::Ended(Outcome::Singular(message))),
+        };
+        // Perhaps the factors were not exact enough.
+        if step.outcome != qp::Outcome::Converged && solver.sharpen() {
+            return Break(Trial::Refused(step));
+        }
+        if let Err(outcome) = Outcome::of_program(step.outcome) {
+            return Break(Trial::Ended(outcome));
+        }
+        let Some(control) = control else { return Continue(step) };
+        let (from, drop) = ((&iterate.u, &mut iterate.state), forcing.drop);
+        match control.steer(problem, solver, from, (&mut step, drop), timer) {
+            Ok(true) => Continue(step),
+            Ok(false) => Break(Trial::Refused(step)),
+            Err(outcome) => Break(Trial::Ended(outcome)),
         }
     }
 

@@ -30,6 +30,18 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// Whether what a quadratic program found is worth going on with.
+    ///
+    /// # Errors
+    /// How the iteration ends if it is not.
+    pub fn of_program(program: qp::Outcome) -> Result<(), Self> {
+        match program {
+            qp::Outcome::Converged | qp::Outcome::LimitReached => Ok(()),
+            qp::Outcome::NotFinite => Err(Self::NotFinite),
+            program => Err(Self::Inner(program)),
+        }
+    }
+
     /// What to tell the user, `None` if all is well.
     pub fn message(&self) -> Option<String> {
         Some(match self {
