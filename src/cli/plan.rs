@@ -35,7 +35,6 @@ pub(super) struct Plan {
     #[serde(default)]
     pub refinements: Vec<RefinementRow>,
     /// Whether the present mesh is solved on again, as it is the last one: bounds of a limit load have to be near only there.
-    #[serde(default)]
     pub again: bool,
 }
 

@@ -58,7 +58,9 @@ impl Run<'_> {
         let (mut before, mut next) = (None, On::Meshes(meshes));
         loop {
             let began = self.timer.total_seconds();
-            let found = self.on(plan, scene, (&adaptive, next), checkpoint.take(), monitor);
+            let rough = rough(plan, scene);
+            let solved_as = rough.as_ref().unwrap_or(scene);
+            let found = self.on(plan, solved_as, (&adaptive, next), checkpoint.take(), monitor);
             let (discrete, solved) = match (found, before.take()) {
                 (Ok(found), _) if found.1.summary.converged == Some(true) => found,
                 (Ok((_, failed)), Some(before)) => {
@@ -69,7 +71,6 @@ impl Run<'_> {
                 }
                 (found, _) => return found,
             };
-            let is_rough = scene.limit.is_some() && !plan.again && !plan.refinements.is_empty();
             let increments = counting(&solved.summary, plan.refinements.is_empty());
             let row = self.row((&discrete, &solved), &increments, adaptive.unknowns(), began);
             let row = with_error(plan, row, &scene.solver.error_of);
@@ -89,7 +90,7 @@ impl Run<'_> {
                     tight.into_iter().for_each(|text| monitor.event(&Event::Warning(text)));
                     (before, next, plan.again) = (Some((discrete, solved)), On::Meshes(meshes), false);
                 }
-                _ if is_rough => {
+                _ if rough.is_some() => {
                     monitor.event(&Event::Note("bounds of the limit load on this mesh".into()));
                     (next, plan.again) = (On::Same(Box::new(discrete), solved.u), true);
                 }
@@ -133,8 +134,6 @@ impl Run<'_> {
     ) -> Result<(Discrete, Solved), Failure> {
         let (comm, timer) = (self.comm, self.timer);
         let limit = plan.refinements.last().and_then(|row| row.limit_load);
-        let is_between = !plan.refinements.is_empty() && !plan.again;
-        let scene = if is_between { &rough(scene) } else { scene };
         let (discrete, begin) = match on {
             On::Same(discrete, u) => (*discrete, Begin::Around(u, limit)),
             On::Meshes(meshes) => {
@@ -245,10 +244,11 @@ impl Run<'_> {
     }
 }
 
-/// The scene as it is solved on meshes between the first and the last one.
-fn rough(scene: &Scene) -> Scene {
-    let limit = scene.limit.as_ref().map(|limit| Limit { tolerance: limit.tolerance.max(ROUGH), ..limit.clone() });
-    Scene { limit, ..scene.clone() }
+/// A limit load as it is sought on the present mesh, if that is neither the first nor known to be the last one.
+fn rough(plan: &Plan, scene: &Scene) -> Option<Scene> {
+    let limit = scene.limit.as_ref().filter(|_| !plan.refinements.is_empty() && !plan.again)?;
+    let limit = Limit { tolerance: limit.tolerance.max(ROUGH), ..limit.clone() };
+    Some(Scene { limit: Some(limit), ..scene.clone() })
 }
 
 /// Takes the row of the last mesh down, and returns it with its error. If that was solved on before it counts as well.

@@ -47,12 +47,21 @@ pub fn stopped_after(steps: usize, out: &Path, sets: &[&str]) -> PathBuf {
 
 /// The increment of each Newton step of a run that came to its end.
 pub fn newton(out: &Path) -> Vec<u64> {
-    let (summary, _) = result(out, "two-blocks");
-    summary["newton"].as_array().unwrap().iter().map(|row| row["increment"].as_u64().unwrap()).collect()
+    summary(out, "two-blocks")["newton"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["increment"].as_u64().unwrap())
+        .collect()
 }
 
 pub fn checkpoint(out: &Path) -> PathBuf {
     out.join("two-blocks.checkpoint.h5")
+}
+
+/// The summary of a run that came to its end.
+pub fn summary(out: &Path, name: &str) -> Value {
+    serde_json::from_str(&fs::read_to_string(out.join(format!("{name}.json"))).unwrap()).unwrap()
 }
 
 /// Fields by name.
@@ -60,8 +69,7 @@ type Bits = Vec<(String, Vec<u64>)>;
 
 /// The summary but for what belongs to the run, and the bits of all fields.
 fn result(out: &Path, name: &str) -> (Map<String, Value>, Bits) {
-    let text = fs::read_to_string(out.join(format!("{name}.json"))).unwrap();
-    let summary = only_result(serde_json::from_str(&text).unwrap());
+    let summary = only_result(summary(out, name));
     let file = out.join(format!("{name}.vtkhdf"));
     let fields = Fields::at(&file, 0);
     let mut bits = fields.bits(&["VTKHDF/PointData", "VTKHDF/CellData", "convergence"]);

@@ -1,6 +1,6 @@
 //! Limit loads against closed forms: on any ranks, beside loads that stay, with contact, where there is none, and refined.
 
-use crate::checkpoint::{assert_same_result, newton, resume_with, stopped_after};
+use crate::checkpoint::{assert_same_result, newton, resume_with, stopped_after, summary};
 use crate::common::{assert_scene_refused, number, run_briefly, scene_file, solve, solve_with};
 use serde_json::Value;
 
@@ -301,8 +301,7 @@ fn meshes_between_the_first_and_the_last_have_wide_bounds() {
     let (whole, out) = (directory.path().join("whole"), directory.path().join("stopped"));
     let end = run_briefly(1, &crate::checkpoint::solve(&whole, &sets, &[]));
     assert_eq!(end.code, 0, "{}{}", end.stdout, end.stderr);
-    let summary: Value =
-        serde_json::from_str(&std::fs::read_to_string(whole.join("two-blocks.json")).unwrap()).unwrap();
+    let summary = summary(&whole, "two-blocks");
     bounds(&summary, 0.001);
     let rows = summary["refinements"].as_array().unwrap();
     let steps = |row: &Value| number(row, "newton_iterations") as usize;
